@@ -1,0 +1,108 @@
+//! Pictures.
+
+use alloc::vec::Vec;
+
+use crate::cdr::{Error, Reader, Writer};
+use crate::definition::{Definition, Kind};
+use crate::message::{Message, ros};
+use crate::text::Name;
+use crate::time::Time;
+
+/// What the bytes of a picture mean.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[repr(u8)]
+pub enum Encoding {
+    /// Red, green, blue, a byte each.
+    #[default]
+    Rgb8 = 0,
+    /// One byte: how bright.
+    Mono8 = 1,
+    /// Hue (256 steps to the full circle), saturation, intensity, a byte each.
+    Hsi8 = 2,
+}
+
+impl Encoding {
+    /// Bytes of a pixel.
+    pub const fn bytes(self) -> usize {
+        match self {
+            Encoding::Rgb8 | Encoding::Hsi8 => 3,
+            Encoding::Mono8 => 1,
+        }
+    }
+
+    /// Its name to ROS 2, which has no name for HSI.
+    pub const fn ros(self) -> &'static str {
+        match self {
+            Encoding::Rgb8 => "rgb8",
+            Encoding::Mono8 => "mono8",
+            Encoding::Hsi8 => "8UC3",
+        }
+    }
+}
+
+/// A picture: the bytes, row by row from the upper left, are the row behind it; to ROS 2 a `sensor_msgs/Image`.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[repr(C)]
+pub struct Image {
+    /// The frame of the camera.
+    pub frame: Name,
+    /// Pixels in a row.
+    pub width: u32,
+    /// Rows.
+    pub height: u32,
+    /// What the bytes mean.
+    pub encoding: Encoding,
+    /// Opening of the view from side to side (rad).
+    pub field_of_view: f32,
+}
+
+impl Image {
+    /// Bytes that a picture of this form has.
+    pub const fn len(&self) -> usize {
+        self.width as usize * self.height as usize * self.encoding.bytes()
+    }
+
+    /// Whether it has no pixels.
+    pub const fn is_empty(&self) -> bool {
+        self.len() == 0
+    }
+}
+
+impl Message for Image {
+    type Element = u8;
+    const NAME: &'static str = "sensor_msgs/msg/Image";
+
+    fn definition() -> Definition {
+        Definition::new(
+            Self::NAME,
+            [
+                ("header", Kind::Struct(ros::header())),
+                ("height", Kind::U32),
+                ("width", Kind::U32),
+                ("encoding", Kind::String),
+                ("is_bigendian", Kind::U8),
+                ("step", Kind::U32),
+                ("data", Kind::Sequence(Kind::U8.into())),
+            ],
+        )
+    }
+
+    fn encode(&self, row: &[u8], stamp: Time, out: &mut Writer) {
+        out.header(stamp, self.frame.as_str());
+        out.put(self.height).put(self.width).text(self.encoding.ros());
+        out.put(0u8).put(self.width * self.encoding.bytes() as u32).row(row);
+    }
+
+    /// The opening of the view is not part of a `sensor_msgs/Image`: it comes back as zero.
+    fn decode(input: &mut Reader<'_>, row: &mut Vec<u8>) -> Result<Image, Error> {
+        let (_, frame) = input.header()?;
+        let frame = Name::new(frame);
+        let (height, width) = (input.get()?, input.get()?);
+        let at = input.offset();
+        let name = input.text()?;
+        let encoding = [Encoding::Rgb8, Encoding::Mono8, Encoding::Hsi8].into_iter().find(|e| e.ros() == name);
+        let (_big_endian, _step): (u8, u32) = (input.get()?, input.get()?);
+        input.row(row)?;
+        Ok(Image { frame, width, height, encoding: encoding.ok_or(Error::NoSuchValue(at))?, field_of_view: 0.0 })
+    }
+}

@@ -1,0 +1,15 @@
+//! The messages of the abstract robot and of the agents that come with Sinew.
+
+mod body;
+mod command;
+mod decision;
+mod image;
+mod pose;
+mod ranges;
+
+pub use body::{Battery, Bumper, Gyro, Head, WheelTicks};
+pub use command::{Amount, Direction, Drive, Offer, Twist, Verb, Word};
+pub use decision::{Decision, Row, Safety, Target};
+pub use image::{Encoding, Image};
+pub use pose::{FrameTransform, Odometry, Transforms};
+pub use ranges::{Echo, Echoes, LaserScan, Ranges, Risk};
