@@ -16,7 +16,8 @@ fn port_type(ty: &Type) -> Option<(String, Vec<&Type>)> {
         return None;
     }
     let PathArguments::AngleBracketed(arguments) = &last.arguments else { return None };
-    let types = arguments.args.iter().filter_map(|a| if let GenericArgument::Type(t) = a { Some(t) } else { None });
+    let types =
+        arguments.args.iter().filter_map(|a| if let GenericArgument::Type(t) = a { Some(t) } else { None });
     Some((name, types.collect()))
 }
 

@@ -43,7 +43,10 @@ pub fn field(input: TokenStream) -> TokenStream {
     expand(input, message::derive_field)
 }
 
-fn expand(input: TokenStream, derive: fn(syn::DeriveInput) -> syn::Result<proc_macro2::TokenStream>) -> TokenStream {
+fn expand(
+    input: TokenStream,
+    derive: fn(syn::DeriveInput) -> syn::Result<proc_macro2::TokenStream>,
+) -> TokenStream {
     let input = syn::parse_macro_input!(input as syn::DeriveInput);
     derive(input).unwrap_or_else(syn::Error::into_compile_error).into()
 }

@@ -34,6 +34,10 @@ pub(crate) fn derive_message(input: DeriveInput) -> syn::Result<proc_macro2::Tok
             ) -> ::core::result::Result<Self, #types::cdr::Error> {
                 #types::cdr::Field::read(input)
             }
+
+            fn disturb(&mut self, _: &mut [#types::cdr::NoElement], wild: bool, draw: &mut dyn FnMut() -> f64) {
+                #types::cdr::Field::disturb(self, wild, draw);
+            }
         }
     })
 }
@@ -68,6 +72,11 @@ fn derive_struct(input: &DeriveInput) -> syn::Result<proc_macro2::TokenStream> {
 
             fn read(input: &mut #types::cdr::Reader<'_>) -> ::core::result::Result<Self, #types::cdr::Error> {
                 ::core::result::Result::Ok(Self { #(#idents: #types::cdr::Field::read(input)?),* })
+            }
+
+            #[allow(unused_variables)]
+            fn disturb(&mut self, wild: bool, draw: &mut dyn FnMut() -> f64) {
+                #(#types::cdr::Field::disturb(&mut self.#idents, wild, draw);)*
             }
         }
     })

@@ -9,6 +9,8 @@ use syn::{Attribute, Data, DeriveInput, Expr, ExprLit, Field, Fields, Ident, Lit
 pub(crate) fn path_to(krate: &str) -> TokenStream {
     let bare = Ident::new(krate, Span::call_site());
     match crate_name(&format!("sinew-{krate}")) {
+        // The package's own tests see it under the name of its library, not of the package.
+        Ok(FoundCrate::Name(name)) if name == format!("sinew_{krate}") => quote!(::#bare),
         Ok(FoundCrate::Name(name)) => {
             let name = Ident::new(&name, Span::call_site());
             quote!(::#name)

@@ -66,7 +66,10 @@ pub(crate) fn derive(input: DeriveInput) -> syn::Result<proc_macro2::TokenStream
             continue;
         }
         if doc.is_empty() {
-            return Err(syn::Error::new_spanned(field, "a parameter needs a doc comment: what it is, with its unit"));
+            return Err(syn::Error::new_spanned(
+                field,
+                "a parameter needs a doc comment: what it is, with its unit",
+            ));
         }
         let bound = |bound: Option<Expr>| match bound {
             Some(value) => quote!(::core::option::Option::Some((#value) as f64)),

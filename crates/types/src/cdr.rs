@@ -55,10 +55,16 @@ pub enum Error {
 impl fmt::Display for Error {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
-            Error::Short { at, needed } => write!(f, "the message ends early: {needed} more bytes are needed at byte {at}"),
-            Error::Encapsulation(found) => write!(f, "the encoding {:02x}{:02x} is not plain CDR (0001 or 0000)", found[0], found[1]),
+            Error::Short { at, needed } => {
+                write!(f, "the message ends early: {needed} more bytes are needed at byte {at}")
+            }
+            Error::Encapsulation(found) => {
+                write!(f, "the encoding {:02x}{:02x} is not plain CDR (0001 or 0000)", found[0], found[1])
+            }
             Error::NoText(at) => write!(f, "the text at byte {at} is not UTF-8 that ends with a zero"),
-            Error::TooLong { at, len, room } => write!(f, "the row at byte {at} has {len} values, there is room for {room}"),
+            Error::TooLong { at, len, room } => {
+                write!(f, "the row at byte {at} has {len} values, there is room for {room}")
+            }
             Error::NoSuchValue(at) => write!(f, "the number at byte {at} stands for nothing"),
         }
     }
@@ -74,6 +80,23 @@ pub trait Field: Sized {
     fn write(&self, out: &mut Writer);
     /// Reads it.
     fn read(input: &mut Reader<'_>) -> Result<Self, Error>;
+    /// Spoils the numbers in it, to see who notices: `wild` ones are far out or none at all, others look right. `draw` gives
+    /// numbers from 0 to 1. What is no measured number stays as it is.
+    fn disturb(&mut self, wild: bool, draw: &mut dyn FnMut() -> f64) {
+        let _ = (wild, draw);
+    }
+}
+
+/// A spoilt number in place of `x`.
+fn spoilt(x: f64, wild: bool, draw: &mut dyn FnMut() -> f64) -> f64 {
+    let chance = draw();
+    match (wild, (chance * 4.0) as u32) {
+        (false, _) => x * (0.5 + chance) + 0.1 * (draw() - 0.5),
+        (true, 0) => f64::NAN,
+        (true, 1) => f64::INFINITY,
+        (true, 2) => -1e6 * draw(),
+        (true, _) => 1e6 * draw(),
+    }
 }
 
 impl Writer {
@@ -150,7 +173,9 @@ impl<'a> Reader<'a> {
     /// Begins to read a message; refuses what is not plain CDR.
     pub fn new(bytes: &'a [u8]) -> Result<Reader<'a>, Error> {
         match bytes {
-            [0, order @ (0 | 1), _, _, ..] => Ok(Reader { bytes, at: ENCAPSULATION.len(), big_endian: *order == 0 }),
+            [0, order @ (0 | 1), _, _, ..] => {
+                Ok(Reader { bytes, at: ENCAPSULATION.len(), big_endian: *order == 0 })
+            }
             [a, b, _, _, ..] => Err(Error::Encapsulation([*a, *b])),
             _ => Err(Error::Short { at: 0, needed: ENCAPSULATION.len() - bytes.len() }),
         }
@@ -238,7 +263,8 @@ pub trait Element: Field + Copy + Default + Send + Sync + core::fmt::Debug + 'st
 }
 
 macro_rules! number {
-    ($($t:ty => $kind:ident),*) => { $(
+    ($($t:ty => $kind:ident),*) => { $( number! { @ $t => $kind; } )* };
+    (@ $t:ty => $kind:ident; $($disturb:item)?) => {
         impl Field for $t {
             fn kind() -> Kind {
                 Kind::$kind
@@ -253,11 +279,24 @@ macro_rules! number {
                 bytes.copy_from_slice(input.take(size_of::<$t>())?);
                 Ok(if input.big_endian { <$t>::from_be_bytes(bytes) } else { <$t>::from_le_bytes(bytes) })
             }
+            $($disturb)?
+        }
+    };
+}
+
+number! { u8 => U8, i8 => I8, u16 => U16, i16 => I16, u32 => U32, i32 => I32, u64 => U64, i64 => I64 }
+
+macro_rules! measured {
+    ($($t:ty => $kind:ident),*) => { $(
+        number! { @ $t => $kind;
+            fn disturb(&mut self, wild: bool, draw: &mut dyn FnMut() -> f64) {
+                *self = spoilt(f64::from(*self), wild, draw) as $t;
+            }
         }
     )* };
 }
 
-number! { u8 => U8, i8 => I8, u16 => U16, i16 => I16, u32 => U32, i32 => I32, u64 => U64, i64 => I64, f32 => F32, f64 => F64 }
+measured! { f32 => F32, f64 => F64 }
 
 impl Element for f32 {}
 impl Element for f64 {}
@@ -309,7 +348,11 @@ impl<const N: usize> Field for Text<N> {
     fn read(input: &mut Reader<'_>) -> Result<Text<N>, Error> {
         let at = input.at;
         let text = input.text()?;
-        if text.len() > N { Err(Error::TooLong { at, len: text.len(), room: N }) } else { Ok(Text::new(text)) }
+        if text.len() > N {
+            Err(Error::TooLong { at, len: text.len(), room: N })
+        } else {
+            Ok(Text::new(text))
+        }
     }
 }
 
@@ -344,6 +387,9 @@ impl<T: Field + Copy + Default, const N: usize> Field for Sequence<T, N> {
         }
         Ok(row)
     }
+    fn disturb(&mut self, wild: bool, draw: &mut dyn FnMut() -> f64) {
+        self.iter_mut().for_each(|value| value.disturb(wild, draw));
+    }
 }
 
 impl<T: Field + Copy + Default, const N: usize> Field for [T; N] {
@@ -361,6 +407,9 @@ impl<T: Field + Copy + Default, const N: usize> Field for [T; N] {
             *value = T::read(input)?;
         }
         Ok(row)
+    }
+    fn disturb(&mut self, wild: bool, draw: &mut dyn FnMut() -> f64) {
+        self.iter_mut().for_each(|value| value.disturb(wild, draw));
     }
 }
 
@@ -415,7 +464,10 @@ mod tests {
         assert_eq!(Reader::new(&[0, 3, 0, 0]).err(), Some(Error::Encapsulation([0, 3])));
         assert_eq!(Reader::new(&[0, 1]).err(), Some(Error::Short { at: 0, needed: 2 }));
         let mut reader = Reader::new(&[0, 1, 0, 0, 255, 255, 255, 255, 1]).unwrap();
-        assert!(matches!(reader.row::<f64>(&mut Vec::new()), Err(Error::Short { .. })), "a length that cannot be is no allocation");
+        assert!(
+            matches!(reader.row::<f64>(&mut Vec::new()), Err(Error::Short { .. })),
+            "a length that cannot be is no allocation"
+        );
     }
 
     proptest::proptest! {

@@ -21,7 +21,8 @@ pub enum Category {
 
 impl Category {
     /// All categories.
-    pub const ALL: [Category; 5] = [Category::Data, Category::Command, Category::Call, Category::Answer, Category::Event];
+    pub const ALL: [Category; 5] =
+        [Category::Data, Category::Command, Category::Call, Category::Answer, Category::Event];
 
     /// Its name in files and on the screen.
     pub const fn name(self) -> &'static str {
@@ -149,8 +150,13 @@ impl Default for LeastPriority {
 
 impl Filter {
     /// Lets everything through.
-    pub const ALL: Filter =
-        Filter { category: None, least_priority: LeastPriority(Priority::Low), marker: None, recipient: None, every: 0 };
+    pub const ALL: Filter = Filter {
+        category: None,
+        least_priority: LeastPriority(Priority::Low),
+        marker: None,
+        recipient: None,
+        every: 0,
+    };
 
     /// Whether the header passes. `every` is not looked at: it needs a count, which the route keeps.
     #[inline]
@@ -168,12 +174,16 @@ mod tests {
 
     #[test]
     fn the_filter_for_all_passes_all_and_others_choose() {
-        let header = Header { category: Category::Event, priority: Priority::Low, marker: 7, ..Header::default() };
+        let header =
+            Header { category: Category::Event, priority: Priority::Low, marker: 7, ..Header::default() };
         assert!(Filter::ALL.passes(&header) && Filter::default().passes(&header));
         assert!(!Filter { category: Some(Category::Data), ..Filter::ALL }.passes(&header));
         assert!(!Filter { least_priority: LeastPriority(Priority::High), ..Filter::ALL }.passes(&header));
         assert!(Filter { marker: Some(7), ..Filter::ALL }.passes(&header));
-        assert!(Filter { recipient: Some(AgentId(1)), ..Filter::ALL }.passes(&header), "for everybody is for me too");
+        assert!(
+            Filter { recipient: Some(AgentId(1)), ..Filter::ALL }.passes(&header),
+            "for everybody is for me too"
+        );
         let for_two = Header { recipient: AgentId(2), ..header };
         assert!(!Filter { recipient: Some(AgentId(1)), ..Filter::ALL }.passes(&for_two));
     }

@@ -9,6 +9,7 @@ extern crate self as types;
 extern crate std;
 
 pub mod cdr;
+pub mod chance;
 pub mod definition;
 pub mod geometry;
 pub mod header;

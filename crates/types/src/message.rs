@@ -3,7 +3,7 @@
 use alloc::vec::Vec;
 use core::fmt::Debug;
 
-use crate::cdr::{Element, Error, NoElement, Reader, Writer};
+use crate::cdr::{Element, Error, Field as _, NoElement, Reader, Writer};
 use crate::definition::Definition;
 use crate::time::{Duration, Time};
 
@@ -49,6 +49,11 @@ pub trait Message: Copy + Default + Debug + Send + Sync + 'static {
 
     /// Reads what [`encode`](Self::encode) or another program wrote; the row is added to `row`.
     fn decode(input: &mut Reader<'_>, row: &mut Vec<Self::Element>) -> Result<Self, Error>;
+
+    /// Spoils the measured numbers in it, as [`crate::cdr::Field::disturb`] does.
+    fn disturb(&mut self, row: &mut [Self::Element], wild: bool, draw: &mut dyn FnMut() -> f64) {
+        row.iter_mut().for_each(|element| element.disturb(wild, draw));
+    }
 
     /// The value between two others, `ratio` of the way from the `earlier` to the `later`; nothing for types that cannot say.
     fn between(earlier: &Self, later: &Self, ratio: f64) -> Option<Self> {

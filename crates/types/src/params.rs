@@ -78,11 +78,18 @@ pub trait Params: Default + Clone + Send + 'static {
         for row in table.rows() {
             match params.set(&row.key, &row.entry.value) {
                 Some(Ok(())) => {}
-                Some(Err(refused)) => mistakes.push(Mistake::new(row.entry.at, format!("\"{}\" {refused}", row.key))),
+                Some(Err(refused)) => {
+                    mistakes.push(Mistake::new(row.entry.at, format!("\"{}\" {refused}", row.key)))
+                }
                 None => {
                     let fields = Self::fields();
                     let known = fields.iter().map(|field| field.name);
-                    mistakes.push(Mistake::unknown(row.key_at, &format!("parameter of {owner}"), &row.key, known));
+                    mistakes.push(Mistake::unknown(
+                        row.key_at,
+                        &format!("parameter of {owner}"),
+                        &row.key,
+                        known,
+                    ));
                 }
             }
         }
@@ -116,8 +123,14 @@ pub trait ParamValue: Sized {
 }
 
 /// Sets `place` to `value` where kind and range allow it. Written into each set of parameters by its derive.
-pub fn assign<T: ParamValue>(place: &mut T, value: &Value, min: Option<f64>, max: Option<f64>) -> Result<(), Refused> {
-    let new = T::from_value(value).ok_or_else(|| Refused(format!("must be {}, not {} ({value})", T::KIND, value.kind())))?;
+pub fn assign<T: ParamValue>(
+    place: &mut T,
+    value: &Value,
+    min: Option<f64>,
+    max: Option<f64>,
+) -> Result<(), Refused> {
+    let new = T::from_value(value)
+        .ok_or_else(|| Refused(format!("must be {}, not {} ({value})", T::KIND, value.kind())))?;
     if let Some(x) = new.magnitude() {
         let (low, high) = (min.is_some_and(|min| x < min), max.is_some_and(|max| x > max));
         if low || high || x.is_nan() {

@@ -170,7 +170,8 @@ impl FromStr for Duration {
     /// Reads `"250ms"`, `"16.3us"`, `"1.5 s"`, `"2min"`, `"1h"`.
     fn from_str(text: &str) -> Result<Duration, NotADuration> {
         let text = text.trim();
-        let unit_at = text.find(|c: char| c.is_ascii_alphabetic() && c != 'e' && c != 'E').ok_or(NotADuration)?;
+        let unit_at =
+            text.find(|c: char| c.is_ascii_alphabetic() && c != 'e' && c != 'E').ok_or(NotADuration)?;
         let (number, unit) = text.split_at(unit_at);
         let scale = match unit {
             "ns" => 1.0,
@@ -216,9 +217,13 @@ mod tests {
 
     #[test]
     fn a_span_is_read_as_people_write_it() {
-        for (text, nanos) in
-            [("250ms", 250_000_000), ("16.3us", 16_300), ("2 min", 120_000_000_000), ("1e-3s", 1_000_000), ("-5ns", -5)]
-        {
+        for (text, nanos) in [
+            ("250ms", 250_000_000),
+            ("16.3us", 16_300),
+            ("2 min", 120_000_000_000),
+            ("1e-3s", 1_000_000),
+            ("-5ns", -5),
+        ] {
             assert_eq!(text.parse::<Duration>(), Ok(Duration(nanos)), "{text}");
         }
         for text in ["", "5", "ms", "5 parsecs", "1e99h", "nan s"] {

@@ -62,7 +62,8 @@ pub struct Table {
 /// Order says nothing about the meaning of a table.
 impl PartialEq for Table {
     fn eq(&self, other: &Table) -> bool {
-        self.rows.len() == other.rows.len() && self.rows.iter().all(|row| other.get(&row.key) == Some(&row.entry))
+        self.rows.len() == other.rows.len()
+            && self.rows.iter().all(|row| other.get(&row.key) == Some(&row.entry))
     }
 }
 
@@ -101,7 +102,12 @@ impl Mistake {
     }
 
     /// `word` is none of `known`: names the nearest right one when there is one that is near, else all of them.
-    pub fn unknown<'a>(at: Span, kind: &str, word: &str, known: impl IntoIterator<Item = &'a str>) -> Mistake {
+    pub fn unknown<'a>(
+        at: Span,
+        kind: &str,
+        word: &str,
+        known: impl IntoIterator<Item = &'a str>,
+    ) -> Mistake {
         let known: Vec<&str> = known.into_iter().collect();
         let mistake = Mistake::new(at, format!("there is no {kind} \"{word}\""));
         match nearest(word, known.iter().copied()) {
@@ -240,7 +246,8 @@ pub struct Key<'a>(pub &'a str);
 
 impl fmt::Display for Key<'_> {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let bare = !self.0.is_empty() && self.0.chars().all(|c| c.is_ascii_alphanumeric() || c == '_' || c == '-');
+        let bare =
+            !self.0.is_empty() && self.0.chars().all(|c| c.is_ascii_alphanumeric() || c == '_' || c == '-');
         if bare { f.write_str(self.0) } else { write!(f, "{}", Value::Text(self.0.to_owned())) }
     }
 }
@@ -312,7 +319,9 @@ impl Table {
         }
         match self.get_mut(&key).map(|entry| (&mut entry.value, entry.at)) {
             Some((Value::Table(table), _)) => table.set_path(rest, value),
-            Some((other, at)) => Err(Mistake::new(at, format!("\"{key}\" is {}, it has no entry \"{rest}\"", other.kind()))),
+            Some((other, at)) => {
+                Err(Mistake::new(at, format!("\"{key}\" is {}, it has no entry \"{rest}\"", other.kind())))
+            }
             None => Ok(()),
         }
     }
@@ -415,7 +424,10 @@ impl<'a> TableReader<'a> {
         let entry = self.entry(key)?;
         let value = convert(&entry.value);
         if value.is_none() {
-            self.report(Mistake::new(entry.at, format!("\"{key}\" must be {wanted}, not {} ({})", entry.value.kind(), entry.value)));
+            self.report(Mistake::new(
+                entry.at,
+                format!("\"{key}\" must be {wanted}, not {} ({})", entry.value.kind(), entry.value),
+            ));
         }
         value
     }
@@ -522,7 +534,12 @@ impl<'a> TableReader<'a> {
         for row in self.table.rows() {
             if !self.known.contains(&row.key) {
                 let known = self.known.iter().map(String::as_str);
-                self.mistakes.push(Mistake::unknown(row.key_at, &format!("entry in {}", self.what), &row.key, known));
+                self.mistakes.push(Mistake::unknown(
+                    row.key_at,
+                    &format!("entry in {}", self.what),
+                    &row.key,
+                    known,
+                ));
             }
         }
         let clean = self.mistakes.is_empty();
@@ -550,9 +567,12 @@ mod tests {
     #[test]
     fn the_nearest_word_is_the_one_that_was_meant() {
         let known = ["period", "deadline", "executor", "stop_distance"];
-        for (typed, meant) in
-            [("perod", Some("period")), ("stop_distanse", Some("stop_distance")), ("deadlien", Some("deadline")), ("banana", None)]
-        {
+        for (typed, meant) in [
+            ("perod", Some("period")),
+            ("stop_distanse", Some("stop_distance")),
+            ("deadlien", Some("deadline")),
+            ("banana", None),
+        ] {
             assert_eq!(nearest(typed, known), meant, "{typed}");
         }
     }

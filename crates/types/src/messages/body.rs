@@ -2,7 +2,7 @@
 
 use alloc::vec::Vec;
 
-use crate::cdr::{Error, NoElement, Reader, Writer};
+use crate::cdr::{Error, Field as _, NoElement, Reader, Writer};
 use crate::definition::{Definition, Kind};
 use crate::message::{Message, ros};
 use crate::time::Time;
@@ -83,6 +83,10 @@ impl Message for Gyro {
         let rate = input.get()?;
         input.skip_f64(9 + 3 + 9)?;
         Ok(Gyro { rate })
+    }
+
+    fn disturb(&mut self, _: &mut [NoElement], wild: bool, draw: &mut dyn FnMut() -> f64) {
+        self.rate.disturb(wild, draw);
     }
 }
 

@@ -60,6 +60,11 @@ impl Message for Twist {
         Twist::read(input)
     }
 
+    fn disturb(&mut self, _: &mut [NoElement], wild: bool, draw: &mut dyn FnMut() -> f64) {
+        self.linear.disturb(wild, draw);
+        self.angular.disturb(wild, draw);
+    }
+
     fn between(earlier: &Twist, later: &Twist, ratio: f64) -> Option<Twist> {
         let mix = |a: f64, b: f64| a + (b - a) * ratio;
         Some(Twist::new(mix(earlier.linear, later.linear), mix(earlier.angular, later.angular)))

@@ -100,9 +100,23 @@ impl Message for Image {
         let (height, width) = (input.get()?, input.get()?);
         let at = input.offset();
         let name = input.text()?;
-        let encoding = [Encoding::Rgb8, Encoding::Mono8, Encoding::Hsi8].into_iter().find(|e| e.ros() == name);
+        let encoding =
+            [Encoding::Rgb8, Encoding::Mono8, Encoding::Hsi8].into_iter().find(|e| e.ros() == name);
         let (_big_endian, _step): (u8, u32) = (input.get()?, input.get()?);
         input.row(row)?;
-        Ok(Image { frame, width, height, encoding: encoding.ok_or(Error::NoSuchValue(at))?, field_of_view: 0.0 })
+        Ok(Image {
+            frame,
+            width,
+            height,
+            encoding: encoding.ok_or(Error::NoSuchValue(at))?,
+            field_of_view: 0.0,
+        })
+    }
+
+    /// Pixels are no measured numbers to CDR, so they are spoilt here: noise all over, or a picture that is too dark.
+    fn disturb(&mut self, row: &mut [u8], wild: bool, draw: &mut dyn FnMut() -> f64) {
+        for pixel in row {
+            *pixel = if wild { (draw() * 256.0) as u8 } else { *pixel / 3 };
+        }
     }
 }

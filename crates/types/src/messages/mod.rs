@@ -12,4 +12,4 @@ pub use command::{Amount, Direction, Drive, Offer, Twist, Verb, Word};
 pub use decision::{Decision, Row, Safety, Target};
 pub use image::{Encoding, Image};
 pub use pose::{FrameTransform, Odometry, Transforms};
-pub use ranges::{Echo, Echoes, LaserScan, Ranges, Risk};
+pub use ranges::{DIRECTIONS, Echo, Echoes, LaserScan, Ranges, Risk};

@@ -52,8 +52,14 @@ impl Message for Odometry {
             [("position", Kind::Struct(ros::point())), ("orientation", Kind::Struct(ros::quaternion()))],
         );
         let covariance = || ("covariance", Kind::Array(Kind::F64.into(), 36));
-        let pose = Definition::new("geometry_msgs/msg/PoseWithCovariance", [("pose", Kind::Struct(pose)), covariance()]);
-        let twist = Definition::new("geometry_msgs/msg/TwistWithCovariance", [("twist", Twist::kind()), covariance()]);
+        let pose = Definition::new(
+            "geometry_msgs/msg/PoseWithCovariance",
+            [("pose", Kind::Struct(pose)), covariance()],
+        );
+        let twist = Definition::new(
+            "geometry_msgs/msg/TwistWithCovariance",
+            [("twist", Twist::kind()), covariance()],
+        );
         Definition::new(
             Self::NAME,
             [
@@ -85,6 +91,12 @@ impl Message for Odometry {
         Ok(Odometry { frame, body, pose, twist })
     }
 
+    fn disturb(&mut self, _: &mut [NoElement], wild: bool, draw: &mut dyn FnMut() -> f64) {
+        self.pose.x.disturb(wild, draw);
+        self.pose.y.disturb(wild, draw);
+        self.pose.heading.disturb(wild, draw);
+    }
+
     /// Along the straight line, the heading by the shorter way.
     fn between(earlier: &Odometry, later: &Odometry, ratio: f64) -> Option<Odometry> {
         let mix = |a: f64, b: f64| a + (b - a) * ratio;
@@ -96,7 +108,10 @@ impl Message for Odometry {
 
     /// Along the arc of the last velocity.
     fn beyond(last: &Odometry, span: Duration) -> Option<Odometry> {
-        Some(Odometry { pose: last.pose.advanced(last.twist.linear, last.twist.angular, span.seconds()), ..*last })
+        Some(Odometry {
+            pose: last.pose.advanced(last.twist.linear, last.twist.angular, span.seconds()),
+            ..*last
+        })
     }
 }
 
@@ -165,7 +180,11 @@ impl Message for Transforms {
             let (qz, qw): (f64, f64) = (input.get()?, input.get()?);
             let pose = Pose { x, y, heading: wrap(2.0 * libm::atan2(qz, qw)) };
             let room = edges.capacity();
-            edges.push(FrameTransform { parent, child, pose, z }).map_err(|_| Error::TooLong { at, len, room })?;
+            edges.push(FrameTransform { parent, child, pose, z }).map_err(|_| Error::TooLong {
+                at,
+                len,
+                room,
+            })?;
         }
         Ok(Transforms { edges })
     }

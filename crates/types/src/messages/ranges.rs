@@ -2,7 +2,7 @@
 
 use alloc::vec::Vec;
 
-use crate::cdr::{Error, NoElement, Reader, Writer};
+use crate::cdr::{Error, Field as _, NoElement, Reader, Writer};
 use crate::definition::{Definition, Kind};
 use crate::geometry::Point;
 use crate::message::{Field, Message, ros};
@@ -109,7 +109,9 @@ impl Ranges {
     /// The points that were met, around the robot's centre (m); directions in which nothing was met give none.
     pub fn points(&self) -> impl Iterator<Item = Point> + '_ {
         let far = f64::from(self.range_max) - 1e-3;
-        self.polar().filter(move |(_, range)| *range < far).map(|(bearing, range)| Point::polar(range, bearing))
+        self.polar()
+            .filter(move |(_, range)| *range < far)
+            .map(|(bearing, range)| Point::polar(range, bearing))
     }
 }
 
@@ -158,7 +160,14 @@ impl Beams<'_> {
         let _angle_max: f32 = input.get()?;
         let angle_step = input.get()?;
         let _time_step: f32 = input.get()?;
-        Ok(Beams { frame, angle_min, angle_step, scan_time: input.get()?, range_min: input.get()?, range_max: input.get()? })
+        Ok(Beams {
+            frame,
+            angle_min,
+            angle_step,
+            scan_time: input.get()?,
+            range_min: input.get()?,
+            range_max: input.get()?,
+        })
     }
 }
 
@@ -172,7 +181,8 @@ impl Message for Ranges {
 
     fn encode(&self, _: &[NoElement], stamp: Time, out: &mut Writer) {
         let Ranges { angle_min, angle_step, range_min, range_max, .. } = *self;
-        let beams = Beams { frame: self.frame.as_str(), angle_min, angle_step, scan_time: 0.0, range_min, range_max };
+        let beams =
+            Beams { frame: self.frame.as_str(), angle_min, angle_step, scan_time: 0.0, range_min, range_max };
         beams.write(stamp, &self.values, out);
     }
 
@@ -180,6 +190,10 @@ impl Message for Ranges {
         let Beams { frame, angle_min, angle_step, range_min, range_max, .. } = Beams::read(input)?;
         let frame = Name::new(frame);
         Ok(Ranges { frame, angle_min, angle_step, range_min, range_max, values: input.get()? })
+    }
+
+    fn disturb(&mut self, _: &mut [NoElement], wild: bool, draw: &mut dyn FnMut() -> f64) {
+        self.values.disturb(wild, draw);
     }
 }
 
@@ -193,7 +207,8 @@ impl Message for LaserScan {
 
     fn encode(&self, row: &[f32], stamp: Time, out: &mut Writer) {
         let LaserScan { angle_min, angle_step, range_min, range_max, scan_time, .. } = *self;
-        Beams { frame: self.frame.as_str(), angle_min, angle_step, scan_time, range_min, range_max }.write(stamp, row, out);
+        Beams { frame: self.frame.as_str(), angle_min, angle_step, scan_time, range_min, range_max }
+            .write(stamp, row, out);
     }
 
     /// The mount is not part of a `sensor_msgs/LaserScan`: it comes back as zero, and stands in the frame tree.
@@ -201,6 +216,14 @@ impl Message for LaserScan {
         let Beams { frame, angle_min, angle_step, scan_time, range_min, range_max } = Beams::read(input)?;
         let frame = Name::new(frame);
         input.row(row)?;
-        Ok(LaserScan { frame, angle_min, angle_step, range_min, range_max, scan_time, ..LaserScan::default() })
+        Ok(LaserScan {
+            frame,
+            angle_min,
+            angle_step,
+            range_min,
+            range_max,
+            scan_time,
+            ..LaserScan::default()
+        })
     }
 }
