@@ -1,0 +1,70 @@
+//! What is being added up while offers are fused.
+
+use super::Inference;
+use crate::fuzzy::{self, Claim, Set};
+use libm::{fmax, fmin};
+
+/// Everything that the offers say, by axis and form.
+#[derive(Default)]
+pub(super) struct Sums {
+    /// Speeds in numbers.
+    pub(super) linear: Mean,
+    /// Turn rates in numbers.
+    pub(super) angular: Mean,
+    /// Words for a speed.
+    pub(super) along: Words,
+    /// Words for a change of the speed.
+    pub(super) speed: Words,
+    /// Words for a turn.
+    pub(super) turn: Words,
+}
+
+/// A weighted mean in the making.
+#[derive(Default)]
+pub(super) struct Mean {
+    sum: f64,
+    weight: f64,
+}
+
+impl Mean {
+    pub(super) fn add(&mut self, value: f64, weight: f64) {
+        self.sum += value * weight;
+        self.weight += weight;
+    }
+
+    pub(super) fn value(&self) -> Option<f64> {
+        (self.weight > 0.0).then(|| self.sum / self.weight)
+    }
+}
+
+/// The words on one axis: a set for each sign for Mamdani, a mean for Sugeno.
+pub(super) struct Words {
+    positive: Set,
+    negative: Set,
+    singletons: Mean,
+    /// The largest weight of a word.
+    pub(super) weight: f64,
+}
+
+impl Default for Words {
+    fn default() -> Words {
+        Words { positive: Set::EMPTY, negative: Set::EMPTY, singletons: Mean::default(), weight: 0.0 }
+    }
+}
+
+impl Words {
+    pub(super) fn add(&mut self, claim: Claim, sign: f64, weight: f64) {
+        let set = if sign > 0.0 { &mut self.positive } else { &mut self.negative };
+        set.add(claim, fmin(weight, 1.0));
+        self.singletons.add(sign * claim.term.centre(), weight);
+        self.weight = fmax(self.weight, weight);
+    }
+
+    pub(super) fn value(&self, inference: Inference) -> Option<f64> {
+        match inference {
+            Inference::Sugeno => self.singletons.value(),
+            // Claims of the negative side were made on its mirror image.
+            Inference::Mamdani => fuzzy::centroid_of_two_sides(&self.positive, &self.negative),
+        }
+    }
+}
