@@ -1,0 +1,26 @@
+//! From raw sensor readings to what a robot acts on: pictures to coloured blobs, echoes to distances and risks.
+//!
+//! Values in, values out. Every buffer belongs to the caller; what needs scratch is a struct that is made once from
+//! the size of the picture, and no call allocates. There is no clock in here: time comes in as an argument.
+//!
+//! | module | from | to |
+//! |---|---|---|
+//! | [`colour`] | RGB picture | HSI picture, mask of a colour range |
+//! | [`blobs`] | mask | connected regions with area, centre, box and orientation |
+//! | [`edges`] | intensity picture | strength of the edges |
+//! | [`motion`] | two intensity pictures | mask, number and centre of the changed pixels |
+//! | [`target`] | blob and camera | bearing, elevation, share of the picture |
+//! | [`sonar`] | ring of ranges | filtered ranges, risk per direction |
+//! | [`laser`] | laser scan | ring of ranges around the robot |
+#![forbid(unsafe_code)]
+
+pub mod blobs;
+pub mod colour;
+pub mod edges;
+pub mod laser;
+pub mod motion;
+pub mod picture;
+pub mod sonar;
+pub mod target;
+
+pub use picture::{Size, WrongLength};
