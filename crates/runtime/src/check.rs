@@ -1,0 +1,159 @@
+//! All mistakes of a plan at once, without running anything.
+
+use types::value::{Mistake, Span};
+
+use crate::agent::{AgentType, Registry};
+use crate::plan::{AgentPlan, ExecutorPlan, Plan, WirePlan};
+use crate::port::Direction;
+use crate::router::{robot_wires, timing_of};
+
+/// All mistakes of a plan, in the order of the file as far as places are known.
+pub fn check(plan: &Plan, registry: &Registry) -> Vec<Mistake> {
+    let mut checker = Checker { plan, registry, mistakes: Vec::new() };
+    checker.executors();
+    checker.agents();
+    for wire in &plan.wires {
+        checker.wire(wire);
+    }
+    checker.mistakes.sort_by_key(|mistake| mistake.at.start);
+    checker.mistakes
+}
+
+/// The executors of a plan: the usual ones, changed and added to by its own.
+pub fn executors_of(plan: &Plan) -> Vec<ExecutorPlan> {
+    let mut executors = ExecutorPlan::usual();
+    for own in &plan.executors {
+        match executors.iter_mut().find(|usual| usual.name == own.name) {
+            Some(usual) => *usual = own.clone(),
+            None => executors.push(own.clone()),
+        }
+    }
+    executors
+}
+
+/// All wires of a plan: its own, and those that join agents to their robots. A wire that the plan names itself takes the place
+/// of the one to the robot's port.
+pub fn wires_of(plan: &Plan, registry: &Registry) -> Vec<WirePlan> {
+    let mut wires = Vec::new();
+    for agent in &plan.agents {
+        let (Some(robot), Some(kind)) = (&agent.robot, registry.get(&agent.kind)) else { continue };
+        let own = robot_wires(agent, kind, robot).into_iter();
+        wires.extend(
+            own.filter(|wire| !plan.wires.iter().any(|given| given.to == wire.to && given.from == wire.from)),
+        );
+    }
+    wires.extend(plan.wires.iter().cloned());
+    wires
+}
+
+struct Checker<'a> {
+    plan: &'a Plan,
+    registry: &'a Registry,
+    mistakes: Vec<Mistake>,
+}
+
+impl<'a> Checker<'a> {
+    fn say(&mut self, at: Span, what: String) {
+        self.mistakes.push(Mistake::new(at, what));
+    }
+
+    fn executors(&mut self) {
+        for (i, executor) in self.plan.executors.iter().enumerate() {
+            if executor.priority.is_some_and(|priority| !(1..=94).contains(&priority)) {
+                let what = format!(
+                    "the priority of executor \"{}\" must lie from 1 to 94; 95 and above belong to the witness",
+                    executor.name
+                );
+                self.say(executor.at, what);
+            }
+            if self.plan.executors[..i].iter().any(|other| other.name == executor.name) {
+                self.say(executor.at, format!("there are two executors \"{}\"", executor.name));
+            }
+        }
+    }
+
+    fn agents(&mut self) {
+        let executors = executors_of(self.plan);
+        for (i, agent) in self.plan.agents.iter().enumerate() {
+            if self.plan.agents[..i].iter().any(|other| other.name == agent.name) {
+                self.say(agent.at, format!("there are two agents \"{}\"", agent.name));
+            }
+            if let Some(name) = &agent.executor
+                && !executors.iter().any(|known| known.name == *name)
+            {
+                let known = executors.iter().map(|executor| executor.name.as_str());
+                self.mistakes.push(Mistake::unknown(agent.at, "executor", name, known));
+            }
+            let Some(kind) = self.registry.get(&agent.kind) else {
+                let known = self.registry.types().iter().map(|kind| kind.kind);
+                self.mistakes.push(Mistake::unknown(agent.at, "type of agent", &agent.kind, known));
+                continue;
+            };
+            self.mistakes.extend(kind.check_params(&agent.params));
+            for input in &agent.on {
+                if kind.port(input).is_none_or(|port| port.shape.input.is_none()) {
+                    let known =
+                        kind.ports.iter().filter(|port| port.shape.input.is_some()).map(|port| port.name);
+                    self.mistakes.push(Mistake::unknown(
+                        agent.at,
+                        &format!("input of {}", agent.kind),
+                        input,
+                        known,
+                    ));
+                }
+            }
+            if let Err(refusal) = timing_of(agent) {
+                self.mistakes.push(Mistake { at: agent.at, what: refusal.what, help: refusal.help });
+            }
+        }
+    }
+
+    fn end(&mut self, name: &str, at: Span) -> Option<(&'a AgentPlan, &'a AgentType, usize)> {
+        let Some((agent_name, port)) = name.rsplit_once('.') else {
+            self.mistakes.push(
+                Mistake::new(at, format!("\"{name}\" is no port")).help("write it as in \"sonar.filtered\""),
+            );
+            return None;
+        };
+        let Some(agent) = self.plan.agent(agent_name) else {
+            let known = self.plan.agents.iter().map(|agent| agent.name.as_str());
+            self.mistakes.push(Mistake::unknown(at, "agent", agent_name, known));
+            return None;
+        };
+        // An unknown type has been said already.
+        let kind = self.registry.get(&agent.kind)?;
+        let place = kind.ports.iter().position(|known| known.name == port);
+        if place.is_none() {
+            let known = kind.ports.iter().map(|port| port.name);
+            self.mistakes.push(Mistake::unknown(at, &format!("port of {agent_name}"), port, known));
+        }
+        Some((agent, kind, place?))
+    }
+
+    fn wire(&mut self, wire: &WirePlan) {
+        let (from, to) = (self.end(&wire.from, wire.at), self.end(&wire.to, wire.at));
+        let (Some((_, out_kind, out)), Some((_, in_kind, into))) = (from, to) else { return };
+        let (out, into) = (&out_kind.ports[out].shape, &in_kind.ports[into].shape);
+        match (out.direction, into.direction) {
+            (Direction::Output, Direction::Input) | (Direction::Client, Direction::Service) => {
+                let fits = out.output == into.input
+                    && (out.direction == Direction::Output || out.input == into.output);
+                if let (false, Some(sends), Some(takes)) = (fits, out.output, into.input) {
+                    let what = format!(
+                        "{} sends {}, {} takes {}",
+                        wire.from,
+                        sends.short_name(),
+                        wire.to,
+                        takes.short_name()
+                    );
+                    self.say(wire.at, what);
+                }
+            }
+            (a, b) => {
+                let what = format!("{} is an {}, {} an {}", wire.from, a.name(), wire.to, b.name());
+                let help = "a wire leads from an output to an input, or from a client to a service";
+                self.mistakes.push(Mistake::new(wire.at, what).help(help));
+            }
+        }
+    }
+}

@@ -1,0 +1,284 @@
+//! What belongs to the thread that runs agents: the time of the step, the wake-ups that it owes, its end of the log.
+
+#![allow(unsafe_code)]
+
+use std::cell::{Cell, UnsafeCell};
+use std::ptr;
+use std::sync::Arc;
+
+use types::{AgentId, Time};
+
+use crate::door::{Door, bit_of};
+use crate::names::Directory;
+use crate::trace;
+
+/// How many doors one step can owe a wake-up before the first is rung early.
+const DOORS: usize = 16;
+
+/// The agents of one executor that have something to do, a bit each in data-flow order.
+#[derive(Debug, Default)]
+pub(crate) struct ReadySet {
+    words: UnsafeCell<Vec<u64>>,
+    rank_of: UnsafeCell<Vec<u32>>,
+}
+
+impl ReadySet {
+    #[allow(clippy::mut_from_ref)]
+    fn words(&self) -> &mut Vec<u64> {
+        // SAFETY: a ready set is touched only by the thread that runs its executor, and no reference leaves this module.
+        unsafe { &mut *self.words.get() }
+    }
+
+    /// Says in which place of the data flow each slot stands, with room for all of them.
+    pub(crate) fn set_order(&self, ranks: &mut Vec<u32>, words: &mut Vec<u64>) {
+        // SAFETY: as in `words`.
+        core::mem::swap(unsafe { &mut *self.rank_of.get() }, ranks);
+        core::mem::swap(self.words(), words);
+    }
+
+    #[inline]
+    pub(crate) fn rank_of(&self, slot: u32) -> Option<u32> {
+        // SAFETY: as in `words`.
+        unsafe { (&*self.rank_of.get()).get(slot as usize).copied().filter(|rank| *rank != u32::MAX) }
+    }
+
+    #[inline]
+    pub(crate) fn mark(&self, slot: u32) {
+        if let Some(rank) = self.rank_of(slot) {
+            self.words()[rank as usize / 64] |= 1 << (rank % 64);
+        }
+    }
+
+    #[inline]
+    pub(crate) fn clear(&self, rank: u32) {
+        self.words()[rank as usize / 64] &= !(1 << (rank % 64));
+    }
+
+    /// The first rank at or behind `from` that is ready.
+    #[inline]
+    pub(crate) fn next(&self, from: u32) -> Option<u32> {
+        let words = self.words();
+        let mut word = from as usize / 64;
+        let mut bits = *words.get(word)? & (u64::MAX << (from % 64));
+        loop {
+            if bits != 0 {
+                return Some(word as u32 * 64 + bits.trailing_zeros());
+            }
+            word += 1;
+            bits = *words.get(word)?;
+        }
+    }
+
+    pub(crate) fn any(&self) -> bool {
+        self.words().iter().any(|word| *word != 0)
+    }
+}
+
+/// What is known of a panic: a fixed record, written without allocation.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct PanicRecord {
+    text: [u8; 160],
+    len: usize,
+    line: u32,
+    file: [u8; 64],
+    file_len: usize,
+}
+
+impl PanicRecord {
+    const EMPTY: PanicRecord = PanicRecord { text: [0; 160], len: 0, line: 0, file: [0; 64], file_len: 0 };
+
+    fn fill(&mut self, info: &std::panic::PanicHookInfo<'_>) {
+        let payload = info.payload();
+        let said = payload
+            .downcast_ref::<&'static str>()
+            .copied()
+            .or_else(|| payload.downcast_ref::<String>().map(String::as_str))
+            .unwrap_or("a value that is no text");
+        self.len = copy_into(said, &mut self.text);
+        if let Some(at) = info.location() {
+            self.line = at.line();
+            let file = at.file();
+            let start = file.len().saturating_sub(self.file.len());
+            self.file_len = copy_into(file.get(start..).unwrap_or(file), &mut self.file);
+        }
+    }
+
+    /// What was said and where, as people read it.
+    pub(crate) fn to_text(self) -> String {
+        let said = String::from_utf8_lossy(&self.text[..self.len]);
+        let file = String::from_utf8_lossy(&self.file[..self.file_len]);
+        format!("{said} ({file}:{})", self.line)
+    }
+}
+
+fn copy_into(text: &str, place: &mut [u8]) -> usize {
+    let mut len = text.len().min(place.len());
+    while !text.is_char_boundary(len) {
+        len -= 1;
+    }
+    place[..len].copy_from_slice(&text.as_bytes()[..len]);
+    len
+}
+
+/// The context of a thread that runs agents.
+pub(crate) struct Context {
+    now: Cell<Time>,
+    agent: Cell<AgentId>,
+    alarm: Cell<Time>,
+    executor: Cell<u32>,
+    ready: Cell<*const ReadySet>,
+    owed: [Cell<(*const Door, u64)>; DOORS],
+    owed_len: Cell<usize>,
+    log: UnsafeCell<Option<trace::Writer>>,
+    panic: Cell<PanicRecord>,
+    in_step: Cell<bool>,
+    directory: Arc<Directory>,
+}
+
+thread_local! {
+    static CURRENT: Cell<*const Context> = const { Cell::new(ptr::null()) };
+}
+
+/// The context of the calling thread, if it runs agents.
+#[inline]
+pub(crate) fn current<R>(use_it: impl FnOnce(&Context) -> R) -> Option<R> {
+    let context = CURRENT.with(Cell::get);
+    // SAFETY: `Context::enter` set the pointer, and its guard takes it back before the context goes.
+    (!context.is_null()).then(|| use_it(unsafe { &*context }))
+}
+
+/// Takes the context back from its thread.
+pub(crate) struct Entered(());
+
+impl Drop for Entered {
+    fn drop(&mut self) {
+        CURRENT.with(|current| current.set(ptr::null()));
+    }
+}
+
+impl Context {
+    pub(crate) fn new(log: Option<trace::Writer>, directory: Arc<Directory>) -> Box<Context> {
+        Box::new(Context {
+            now: Cell::new(Time::ZERO),
+            agent: Cell::new(AgentId::NONE),
+            alarm: Cell::new(Time::NEVER),
+            executor: Cell::new(u32::MAX),
+            ready: Cell::new(ptr::null()),
+            owed: [const { Cell::new((ptr::null(), 0)) }; DOORS],
+            owed_len: Cell::new(0),
+            log: UnsafeCell::new(log),
+            panic: Cell::new(PanicRecord::EMPTY),
+            in_step: Cell::new(false),
+            directory,
+        })
+    }
+
+    /// Makes this the context of the calling thread until the guard goes.
+    pub(crate) fn enter(&self) -> Entered {
+        CURRENT.with(|current| current.set(self));
+        Entered(())
+    }
+
+    /// Begins a step. `ready` must outlive it.
+    #[inline]
+    pub(crate) fn begin(&self, agent: AgentId, now: Time, executor: u32, ready: *const ReadySet) {
+        self.now.set(now);
+        self.agent.set(agent);
+        self.alarm.set(Time::NEVER);
+        self.executor.set(executor);
+        self.ready.set(ready);
+        self.in_step.set(true);
+    }
+
+    /// Ends a step: makes the wake-ups that it owes, each door once. Gives the time for which the agent asked to be woken.
+    #[inline]
+    pub(crate) fn end(&self) -> Time {
+        self.in_step.set(false);
+        for owed in &self.owed[..self.owed_len.take()] {
+            let (door, bits) = owed.get();
+            // SAFETY: a door is owed only through a route that holds it, and routes change only between steps.
+            unsafe { (*door).ring(bits) };
+        }
+        self.alarm.get()
+    }
+
+    #[inline]
+    pub(crate) fn now(&self) -> Time {
+        self.now.get()
+    }
+
+    #[inline]
+    pub(crate) fn agent(&self) -> AgentId {
+        self.agent.get()
+    }
+
+    /// Asks for a step at `time`, or sooner if it was asked for sooner.
+    pub(crate) fn wake_at(&self, time: Time) {
+        self.alarm.set(self.alarm.get().min(time));
+    }
+
+    /// Makes the agent in `slot` of `executor` ready: at once where it is this thread's, else after the step.
+    #[inline]
+    pub(crate) fn wake(&self, executor: u32, slot: u32, door: &Arc<Door>) {
+        if executor == self.executor.get() {
+            // SAFETY: `begin` was given a ready set that outlives the step.
+            unsafe { (*self.ready.get()).mark(slot) };
+            return;
+        }
+        let (door, bit) = (Arc::as_ptr(door), bit_of(slot));
+        let len = self.owed_len.get();
+        for owed in &self.owed[..len] {
+            let (known, bits) = owed.get();
+            if known == door {
+                owed.set((known, bits | bit));
+                return;
+            }
+        }
+        if len < DOORS {
+            self.owed[len].set((door, bit));
+            self.owed_len.set(len + 1);
+        } else {
+            // SAFETY: as in `end`.
+            unsafe { (*door).ring(bit) };
+        }
+    }
+
+    /// The thread's end of the log.
+    #[inline]
+    pub(crate) fn log<R>(&self, write: impl FnOnce(&mut trace::Writer) -> R) -> Option<R> {
+        // SAFETY: only the thread itself comes here, and `write` does not come back.
+        unsafe { (*self.log.get()).as_mut().map(write) }
+    }
+
+    /// The names of all agents.
+    pub(crate) fn directory(&self) -> &Directory {
+        &self.directory
+    }
+
+    /// What the last panic said.
+    pub(crate) fn panic_record(&self) -> PanicRecord {
+        self.panic.get()
+    }
+}
+
+/// Once in a process: a panic inside a step is written into its thread's record, and nothing is printed. Others are
+/// printed as before.
+pub(crate) fn install_panic_hook() {
+    static ONCE: std::sync::Once = std::sync::Once::new();
+    ONCE.call_once(|| {
+        let before = std::panic::take_hook();
+        std::panic::set_hook(Box::new(move |info| {
+            let recorded = current(|context| {
+                if context.in_step.get() {
+                    let mut record = PanicRecord::EMPTY;
+                    record.fill(info);
+                    context.panic.set(record);
+                }
+                context.in_step.get()
+            });
+            if recorded != Some(true) {
+                before(info);
+            }
+        }));
+    });
+}

@@ -1,0 +1,665 @@
+//! What an operating-system thread runs: agents, one after another.
+//!
+//! The core is the same on every clock. It knows which agents are due or made ready and in which order they go; whoever owns
+//! it says what time it is. An agent's step is the only foreign code, and while it runs nobody holds a reference into the
+//! core: a thread that does not come back from a step can lose the core to another.
+
+#![allow(unsafe_code)]
+
+use core::sync::atomic::{AtomicU32, AtomicU64, Ordering};
+use std::any::Any;
+use std::cmp::Reverse;
+use std::collections::BinaryHeap;
+use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::sync::Arc;
+
+use types::{AgentId, Duration, Name, Time};
+
+use crate::agent::{Body, Fault, Step};
+use crate::context::{Context, ReadySet};
+use crate::door::{CHANGES, Door};
+use crate::os;
+use crate::port::{InputEnd, OutputEnd, PortEnds, WireId};
+use crate::stats::{AgentStats, bump, nanos};
+
+/// When an agent runs.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) struct Timing {
+    /// Zero for an agent that only messages make run.
+    pub period: Duration,
+    pub deadline: Duration,
+    pub min_gap: Duration,
+}
+
+/// An agent's place in an executor.
+pub(crate) struct Seat {
+    pub id: AgentId,
+    pub name: Name,
+    pub body: Option<Box<dyn Body>>,
+    pub ends: Vec<PortEnds>,
+    /// The inputs whose messages make it run.
+    pub on: Vec<Arc<dyn InputEnd>>,
+    pub timing: Timing,
+    pub stats: Arc<AgentStats>,
+    pub next_release: Time,
+    pub alarm: Time,
+    pub last_step: Time,
+    pub started: bool,
+    pub fault: StepFault,
+}
+
+/// How an agent misbehaves on request.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum StepFault {
+    /// It does not.
+    #[default]
+    None,
+    /// Its steps are left out.
+    Off,
+    /// Its next step panics.
+    Panic,
+    /// Its next step does not return.
+    Hang,
+    /// Only every fourth of its steps is done.
+    Slow,
+}
+
+/// Why an agent died.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum Cause {
+    /// Its step reported a fault.
+    Fault(Fault),
+    /// Its step panicked.
+    Panic(String),
+    /// Its step did not return.
+    Hang,
+}
+
+impl core::fmt::Display for Cause {
+    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+        match self {
+            Cause::Fault(fault) => write!(f, "fault: {fault}"),
+            Cause::Panic(said) => write!(f, "panic: {said}"),
+            Cause::Hang => f.write_str("its step did not return"),
+        }
+    }
+}
+
+/// What is known of a death on the side where it happened, without memory of its own.
+pub(crate) enum RawCause {
+    Fault(Fault),
+    Panic(crate::context::PanicRecord, Box<dyn Any + Send>),
+    Hang,
+}
+
+/// A change, prepared on the control side. It comes back as an answer, with what is to be freed in it.
+pub(crate) enum Change {
+    Seat {
+        slot: u32,
+        seat: Option<Box<Seat>>,
+        seats: Vec<Option<Box<Seat>>>,
+        room: usize,
+    },
+    Unseat {
+        slot: u32,
+        seat: Option<Box<Seat>>,
+    },
+    Order {
+        order: Vec<u32>,
+        ranks: Vec<u32>,
+        words: Vec<u64>,
+        releases: Releases,
+        due: Due,
+    },
+    Join {
+        end: Arc<dyn InputEnd>,
+        lanes: Box<dyn Any + Send>,
+        slot: u32,
+    },
+    Leave {
+        end: Arc<dyn InputEnd>,
+        wire: WireId,
+        into: Box<dyn Any + Send>,
+        force: bool,
+    },
+    Route {
+        end: Arc<dyn OutputEnd>,
+        route: Box<dyn Any + Send>,
+    },
+    Forget {
+        end: Arc<dyn OutputEnd>,
+        wire: WireId,
+        into: Box<dyn Any + Send>,
+    },
+    Body {
+        slot: u32,
+        body: Option<Box<dyn Body>>,
+    },
+    Params {
+        slot: u32,
+        params: Box<dyn Any + Send>,
+    },
+    Timing {
+        slot: u32,
+        timing: Timing,
+    },
+    Fault {
+        slot: u32,
+        fault: StepFault,
+    },
+    /// Sends a message that comes from outside, on the thread that owns the routes.
+    Send {
+        end: Arc<dyn OutputEnd>,
+        bytes: Vec<u8>,
+        result: Option<Result<(), types::cdr::Error>>,
+    },
+    /// Ends all agents.
+    Stop,
+}
+
+type Releases = BinaryHeap<Reverse<(Time, u32)>>;
+type Due = BinaryHeap<Reverse<(Time, u32, u32, Time)>>;
+
+/// Room in the heaps of an executor of this many agents, for [`Change::Order`].
+pub(crate) fn heaps_for(agents: usize) -> (Releases, Due) {
+    (BinaryHeap::with_capacity(agents * 3 + SPARE_ALARMS), BinaryHeap::with_capacity(agents + SPARE_ALARMS))
+}
+
+/// What an executor tells the control side.
+pub(crate) enum Answer {
+    Done(Change),
+    NotDrained(Change),
+    Died { slot: u32, id: AgentId, time: Time, cause: RawCause, body: Option<Box<dyn Body>> },
+}
+
+/// What the watchdog sees of an executor: which agent is in a step, and since when.
+#[derive(Debug, Default)]
+pub(crate) struct Running {
+    /// The slot plus one; zero between steps.
+    pub slot: AtomicU32,
+    /// The number of the agent.
+    pub agent: AtomicU32,
+    /// When the step began, in [`os::ticks`].
+    pub since: AtomicU64,
+    /// Counts steps, so that two of the same agent are told apart.
+    pub steps: AtomicU64,
+}
+
+/// An agent that is to run, and why.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Job {
+    pub slot: u32,
+    /// When it was due; the present for one that a message made run.
+    pub release: Time,
+    pub deadline: Time,
+}
+
+/// The agents of one executor and what is due among them.
+pub(crate) struct Core {
+    pub number: u32,
+    pub seats: Vec<Option<Box<Seat>>>,
+    order: Vec<u32>,
+    ready: Box<ReadySet>,
+    releases: Releases,
+    due: Due,
+    cursor: u32,
+    pub door: Arc<Door>,
+    pub running: Arc<Running>,
+    changes: rtrb::Consumer<Change>,
+    answers: rtrb::Producer<Answer>,
+    nanos_per_tick: f64,
+}
+
+/// The control side's ends of an executor.
+pub(crate) struct Link {
+    pub changes: rtrb::Producer<Change>,
+    pub answers: rtrb::Consumer<Answer>,
+    pub door: Arc<Door>,
+    pub running: Arc<Running>,
+}
+
+/// How many changes or answers can be under way.
+const UNDER_WAY: usize = 1024;
+/// Room for alarms besides the one release of each agent.
+const SPARE_ALARMS: usize = 64;
+
+/// What a step did besides its work.
+pub(crate) enum Ended {
+    /// All is well, or what is not was told to the control side.
+    Normally,
+    /// The step was left out, or nobody was there.
+    NotRun,
+    /// On request, the agent shall be stuck now: the clock knows how.
+    AskedToHang(u32),
+}
+
+impl Core {
+    pub(crate) fn new(number: u32) -> (Core, Link) {
+        let (change_in, changes) = rtrb::RingBuffer::new(UNDER_WAY);
+        let (answers, answer_out) = rtrb::RingBuffer::new(UNDER_WAY);
+        let door = Arc::new(Door::new());
+        let running = Arc::new(Running::default());
+        let core = Core {
+            number,
+            seats: Vec::new(),
+            order: Vec::new(),
+            ready: Box::default(),
+            releases: BinaryHeap::with_capacity(SPARE_ALARMS),
+            due: BinaryHeap::new(),
+            cursor: 0,
+            door: door.clone(),
+            running: running.clone(),
+            changes,
+            answers,
+            nanos_per_tick: os::nanos_per_tick(),
+        };
+        (core, Link { changes: change_in, answers: answer_out, door, running })
+    }
+
+    /// When the next agent is due by the clock.
+    pub(crate) fn next_release(&self) -> Time {
+        self.releases.peek().map_or(Time::NEVER, |Reverse((time, _))| *time)
+    }
+
+    /// Takes what others have rung for, and serves changes.
+    pub(crate) fn look_at_door(&mut self, context: &Context, now: Time) {
+        let bits = self.door.take();
+        if bits == 0 {
+            return;
+        }
+        for slot in 0..self.seats.len() as u32 {
+            if bits & crate::door::bit_of(slot) != 0
+                && let Some(seat) = &self.seats[slot as usize]
+                && seat.on.iter().any(|input| input.has_message())
+            {
+                self.ready.mark(slot);
+            }
+        }
+        if bits & CHANGES != 0 {
+            self.serve_changes(context, now);
+        }
+    }
+
+    /// Finds ready agents by looking into the mailboxes: after a hand-over, when nobody knows what was rung.
+    pub(crate) fn find_ready(&mut self) {
+        for slot in 0..self.seats.len() as u32 {
+            if let Some(seat) = &self.seats[slot as usize]
+                && seat.on.iter().any(|input| input.has_message())
+            {
+                self.ready.mark(slot);
+            }
+        }
+    }
+
+    /// Whether something is to be done at `now`.
+    pub(crate) fn has_work(&self, now: Time) -> bool {
+        !self.due.is_empty() || self.next_release() <= now || self.ready.any()
+    }
+
+    /// The agent that runs next: of those that are due the one with the earliest deadline, else the next one in data-flow order
+    /// that a message made ready. Agents made ready behind the cursor wait for the next sweep.
+    pub(crate) fn next(&mut self, now: Time) -> Option<Job> {
+        self.collect_due(now);
+        if let Some(Reverse((deadline, rank, slot, release))) = self.due.pop() {
+            self.ready.clear(rank);
+            return Some(Job { slot, release, deadline });
+        }
+        loop {
+            let rank = self.ready.next(self.cursor).or_else(|| self.ready.next(0))?;
+            self.ready.clear(rank);
+            self.cursor = rank + 1;
+            let slot = self.order[rank as usize];
+            let Some(seat) = self.seats[slot as usize].as_mut() else { continue };
+            let earliest = seat.last_step.saturating_add(seat.timing.min_gap);
+            if seat.timing.min_gap > Duration::ZERO && earliest > now {
+                seat.alarm = seat.alarm.min(earliest);
+                let alarm = seat.alarm;
+                self.push_release(alarm, slot);
+                continue;
+            }
+            return Some(Job { slot, release: now, deadline: now.saturating_add(seat.timing.deadline) });
+        }
+    }
+
+    fn collect_due(&mut self, now: Time) {
+        while let Some(Reverse((time, slot))) = self.releases.peek().copied() {
+            if time > now {
+                return;
+            }
+            self.releases.pop();
+            let Some(seat) = self.seats.get_mut(slot as usize).and_then(Option::as_mut) else { continue };
+            let mut release = None;
+            if seat.next_release <= now {
+                // Releases that were passed over are counted and never made up for: no burst.
+                let period = seat.timing.period;
+                let passed = (now - seat.next_release).0 / period.0.max(1);
+                let stats = &seat.stats;
+                stats.skipped.store(stats.skipped.load(Ordering::Relaxed) + passed as u64, Ordering::Relaxed);
+                let due = seat.next_release + period * passed;
+                seat.next_release = due + period;
+                release = Some(due);
+                let next = seat.next_release;
+                self.push_release(next, slot);
+            }
+            let Some(seat) = self.seats.get_mut(slot as usize).and_then(Option::as_mut) else { continue };
+            if seat.alarm <= now {
+                release = release.or(Some(seat.alarm));
+                seat.alarm = Time::NEVER;
+            }
+            if let Some(release) = release
+                && let Some(rank) = self.ready.rank_of(slot)
+                && !self.due.iter().any(|Reverse((_, _, known, _))| *known == slot)
+            {
+                let deadline = release.saturating_add(seat.timing.deadline);
+                self.due.push(Reverse((deadline, rank, slot, release)));
+            }
+        }
+    }
+
+    fn push_release(&mut self, time: Time, slot: u32) {
+        if self.releases.len() == self.releases.capacity() {
+            // Entries for which no seat waits any more are of no use; what is left has room.
+            let seats = &self.seats;
+            self.releases.retain(|Reverse((time, slot))| {
+                seats
+                    .get(*slot as usize)
+                    .and_then(Option::as_ref)
+                    .is_some_and(|seat| seat.next_release == *time || seat.alarm == *time)
+            });
+        }
+        self.releases.push(Reverse((time, slot)));
+    }
+
+    /// Runs one step. `now` is the time that the agent sees. `measure` gives the time at its end for one that began `now`,
+    /// from the nanoseconds that it took; a simulated clock says that it took none.
+    ///
+    /// # Safety
+    /// `core` is valid and owned by the calling thread. `still_mine` says after the step whether that is so: if not, the core
+    /// was handed to another thread meanwhile and is not touched any more.
+    pub(crate) unsafe fn run(
+        core: *mut Core,
+        context: &Context,
+        job: Job,
+        now: Time,
+        elapses: bool,
+        still_mine: impl FnOnce() -> bool,
+    ) -> Option<Ended> {
+        // SAFETY: the caller owns the core; this borrow ends before the step.
+        let (body, mut step, begun) = {
+            let core = unsafe { &mut *core };
+            let Some(seat) = core.seats.get_mut(job.slot as usize).and_then(Option::as_mut) else {
+                return Some(Ended::NotRun);
+            };
+            if seat.body.is_none() {
+                return Some(Ended::NotRun);
+            }
+            bump(&seat.stats.releases);
+            match seat.fault {
+                StepFault::None | StepFault::Panic => {}
+                StepFault::Off => return Some(Ended::NotRun),
+                StepFault::Slow if !seat.stats.releases.load(Ordering::Relaxed).is_multiple_of(4) => {
+                    return Some(Ended::NotRun);
+                }
+                StepFault::Slow => {}
+                StepFault::Hang => {
+                    seat.fault = StepFault::None;
+                    return Some(Ended::AskedToHang(job.slot));
+                }
+            }
+            let Some(body) = seat.body.take() else { return Some(Ended::NotRun) };
+            seat.last_step = now;
+            seat.stats.jitter.add(nanos(now - job.release));
+            let seat_id = seat.id;
+            let step = Step { now, deadline: job.deadline, agent: seat.id, period: seat.timing.period };
+            context.begin(seat.id, now, core.number, &*core.ready);
+            let begun = os::ticks();
+            core.running.since.store(begun, Ordering::Relaxed);
+            core.running.steps.store(core.running.steps.load(Ordering::Relaxed) + 1, Ordering::Relaxed);
+            core.running.agent.store(seat_id.0, Ordering::Relaxed);
+            core.running.slot.store(job.slot + 1, Ordering::Relaxed);
+            (body, step, begun)
+        };
+        let (first, panics, taken) = {
+            // SAFETY: as above.
+            let core = unsafe { &mut *core };
+            let seat = core.seats[job.slot as usize].as_mut()?;
+            let first = !core::mem::replace(&mut seat.started, true);
+            let panics = seat.fault == StepFault::Panic;
+            if panics {
+                seat.fault = StepFault::None;
+            }
+            (first, panics, seat.on.iter().map(|input| input.taken()).sum::<u64>())
+        };
+        let mut body = Some(body);
+        let result = catch_unwind(AssertUnwindSafe(|| {
+            if panics {
+                panic!("asked to panic");
+            }
+            let Some(body) = body.as_mut() else { return Ok(()) };
+            if first {
+                body.start(&mut step)?;
+            }
+            body.step(&mut step)
+        }));
+        let ended = os::ticks();
+        if !still_mine() {
+            // The watchdog gave the agent up; what it left behind is freed here, on a thread that has lost its priority.
+            return None;
+        }
+        // SAFETY: the core is still this thread's.
+        let core = unsafe { &mut *core };
+        core.running.slot.store(0, Ordering::Relaxed);
+        let alarm = context.end();
+        core.end(context, job, now, result, body, alarm, taken, (begun, ended), elapses);
+        Some(Ended::Normally)
+    }
+
+    #[allow(clippy::too_many_arguments)]
+    fn end(
+        &mut self,
+        context: &Context,
+        job: Job,
+        now: Time,
+        result: Result<Result<(), Fault>, Box<dyn Any + Send>>,
+        mut body: Option<Box<dyn Body>>,
+        alarm: Time,
+        taken: u64,
+        (begun, ended): (u64, u64),
+        elapses: bool,
+    ) {
+        let took = (ended.saturating_sub(begun) as f64 * self.nanos_per_tick) as u64;
+        let Some(seat) = self.seats.get_mut(job.slot as usize).and_then(Option::as_mut) else { return };
+        seat.stats.exec.add(took);
+        let end = if elapses { now + Duration(took as i64) } else { now };
+        seat.stats.response.add(nanos(end - job.release));
+        if end > job.deadline {
+            bump(&seat.stats.missed);
+        }
+        let cause = match result {
+            Ok(Ok(())) => None,
+            Ok(Err(fault)) => {
+                bump(&seat.stats.faults);
+                Some(RawCause::Fault(fault))
+            }
+            Err(payload) => {
+                bump(&seat.stats.panics);
+                Some(RawCause::Panic(context.panic_record(), payload))
+            }
+        };
+        if let Some(cause) = cause {
+            let died = Answer::Died { slot: job.slot, id: seat.id, time: end, cause, body: body.take() };
+            // There is room: one agent dies once before the control side has taken the news and given it a successor.
+            if let Err(rtrb::PushError::Full(lost)) = self.answers.push(died) {
+                std::mem::forget(lost);
+            }
+            return;
+        }
+        seat.body = body;
+        if alarm < seat.alarm {
+            seat.alarm = alarm;
+            self.push_release(alarm, job.slot);
+        }
+        let Some(seat) = self.seats[job.slot as usize].as_ref() else { return };
+        // What came meanwhile makes it run again; but an agent that does not take its messages is not run for them for ever.
+        let took_some = seat.on.iter().map(|input| input.taken()).sum::<u64>() != taken;
+        if took_some && seat.on.iter().any(|input| input.has_message()) {
+            self.ready.mark(job.slot);
+        }
+    }
+
+    /// Takes an agent that does not come back from its step for dead. Its body is lost to the step; in simulated time it is
+    /// still here, and goes to the control side.
+    pub(crate) fn give_up(&mut self, slot: u32, now: Time) {
+        let Some(seat) = self.seats.get_mut(slot as usize).and_then(Option::as_mut) else { return };
+        bump(&seat.stats.hangs);
+        let died =
+            Answer::Died { slot, id: seat.id, time: now, cause: RawCause::Hang, body: seat.body.take() };
+        if let Err(rtrb::PushError::Full(lost)) = self.answers.push(died) {
+            std::mem::forget(lost);
+        }
+    }
+
+    /// Commits the changes that wait. Each goes back to the control side, to be freed there.
+    pub(crate) fn serve_changes(&mut self, context: &Context, now: Time) {
+        while !self.answers.is_full() {
+            let Ok(mut change) = self.changes.pop() else { return };
+            let done = self.commit(&mut change, context, now);
+            let answer = if done { Answer::Done(change) } else { Answer::NotDrained(change) };
+            if let Err(rtrb::PushError::Full(lost)) = self.answers.push(answer) {
+                std::mem::forget(lost);
+            }
+        }
+    }
+
+    /// Says whether it is done; a wire that still has messages is not cut yet.
+    fn commit(&mut self, change: &mut Change, context: &Context, now: Time) -> bool {
+        match change {
+            Change::Seat { slot, seat, seats, room } => {
+                if self.seats.capacity() < *room {
+                    seats.append(&mut self.seats);
+                    core::mem::swap(&mut self.seats, seats);
+                }
+                if self.seats.len() <= *slot as usize {
+                    self.seats.resize_with(*slot as usize + 1, || None);
+                }
+                if let Some(mut new) = seat.take() {
+                    if new.timing.period > Duration::ZERO {
+                        new.next_release = now;
+                        self.push_release(now, *slot);
+                    }
+                    *seat = self.seats[*slot as usize].replace(new);
+                }
+            }
+            Change::Unseat { slot, seat } => {
+                *seat = self.seats.get_mut(*slot as usize).and_then(Option::take);
+                if let Some(seat) = seat {
+                    self.stop_agent(seat, context, now);
+                }
+                self.due.retain(|Reverse((_, _, known, _))| *known != *slot);
+            }
+            Change::Order { order, ranks, words, releases, due } => {
+                self.reorder(order, ranks, words);
+                if releases.capacity() > self.releases.capacity() {
+                    releases.append(&mut self.releases);
+                    core::mem::swap(releases, &mut self.releases);
+                }
+                if due.capacity() > self.due.capacity() {
+                    due.append(&mut self.due);
+                    core::mem::swap(due, &mut self.due);
+                }
+            }
+            Change::Join { end, lanes, slot } => {
+                end.join(lanes.as_mut());
+                let _ = slot;
+            }
+            Change::Leave { end, wire, into, force } => {
+                if !*force && !end.is_drained(*wire) {
+                    return false;
+                }
+                end.leave(*wire, into.as_mut());
+            }
+            Change::Route { end, route } => end.add_route(route.as_mut()),
+            Change::Forget { end, wire, into } => end.forget(*wire, into.as_mut()),
+            Change::Body { slot, body } => {
+                if let Some(seat) = self.seats.get_mut(*slot as usize).and_then(Option::as_mut) {
+                    core::mem::swap(&mut seat.body, body);
+                    seat.started = false;
+                    if seat.on.iter().any(|input| input.has_message()) {
+                        self.ready.mark(*slot);
+                    }
+                }
+            }
+            Change::Params { slot, params } => {
+                let seat = self.seats.get_mut(*slot as usize).and_then(Option::as_mut);
+                if let Some(body) = seat.and_then(|seat| seat.body.as_mut()) {
+                    body.swap_params(params.as_mut());
+                }
+            }
+            Change::Timing { slot, timing } => {
+                if let Some(seat) = self.seats.get_mut(*slot as usize).and_then(Option::as_mut) {
+                    // A longer period holds at once, a shorter one from the next release on.
+                    let next = if timing.period <= Duration::ZERO {
+                        Time::NEVER
+                    } else if seat.next_release == Time::NEVER {
+                        now
+                    } else if timing.period > seat.timing.period {
+                        seat.next_release - seat.timing.period + timing.period
+                    } else {
+                        seat.next_release
+                    };
+                    seat.timing = *timing;
+                    seat.next_release = next;
+                    if next < Time::NEVER {
+                        self.push_release(next, *slot);
+                    }
+                }
+            }
+            Change::Fault { slot, fault } => {
+                if let Some(seat) = self.seats.get_mut(*slot as usize).and_then(Option::as_mut) {
+                    seat.fault = *fault;
+                }
+            }
+            Change::Send { end, bytes, result } => {
+                context.begin(AgentId::NONE, now, self.number, &*self.ready);
+                *result = Some(end.send_encoded(bytes));
+                context.end();
+            }
+            Change::Stop => {
+                let mut seats = core::mem::take(&mut self.seats);
+                for seat in seats.iter_mut().flatten() {
+                    self.stop_agent(seat, context, now);
+                }
+                self.seats = seats;
+            }
+        }
+        true
+    }
+
+    fn stop_agent(&self, seat: &mut Seat, context: &Context, now: Time) {
+        let Some(body) = seat.body.as_mut() else { return };
+        if !seat.started {
+            return;
+        }
+        context.begin(seat.id, now, self.number, &*self.ready);
+        let mut step = Step { now, deadline: now, agent: seat.id, period: seat.timing.period };
+        let stopped = catch_unwind(AssertUnwindSafe(|| body.stop(&mut step)));
+        context.end();
+        if stopped.is_err() {
+            bump(&seat.stats.panics);
+        }
+    }
+
+    fn reorder(&mut self, order: &mut Vec<u32>, ranks: &mut Vec<u32>, words: &mut Vec<u64>) {
+        let mut from = 0;
+        while let Some(rank) = self.ready.next(from) {
+            from = rank + 1;
+            let slot = self.order[rank as usize];
+            if let Some(new) = ranks.get(slot as usize).copied().filter(|rank| *rank != u32::MAX) {
+                words[new as usize / 64] |= 1 << (new % 64);
+            }
+        }
+        core::mem::swap(&mut self.order, order);
+        self.ready.set_order(ranks, words);
+        self.cursor = 0;
+    }
+}

@@ -1,0 +1,103 @@
+//! The runtime: agents with typed ports, the router that wires them, memory, executors and supervision.
+//!
+//! A system is described by a [`Plan`] and made of agents that a [`Registry`] knows. In simulated time a [`Simulation`] runs
+//! it: one thread plays all executors, and the same plan gives the same bytes.
+//!
+//! ```
+//! use runtime::{Agent, Fault, Input, Options, Output, Plan, Simulation, Step, registry};
+//! use types::{Duration, messages::Twist};
+//!
+//! /// Counts up.
+//! #[derive(Agent)]
+//! struct Source {
+//!     /// The count, as a speed.
+//!     out: Output<Twist>,
+//!     n: f64,
+//! }
+//!
+//! impl Agent for Source {
+//!     fn step(&mut self, _: &mut Step) -> Result<(), Fault> {
+//!         self.n += 1.0;
+//!         self.out.send(Twist::new(self.n, 0.0));
+//!         Ok(())
+//!     }
+//! }
+//!
+//! /// Takes what comes.
+//! #[derive(Agent)]
+//! struct Sink {
+//!     /// What comes.
+//!     count: Input<Twist>,
+//! }
+//!
+//! impl Agent for Sink {
+//!     fn step(&mut self, _: &mut Step) -> Result<(), Fault> {
+//!         while let Some(twist) = self.count.take() {
+//!             assert!(twist.linear > 0.0);
+//!         }
+//!         Ok(())
+//!     }
+//! }
+//!
+//! let mut plan = Plan::new("lesson");
+//! let source = plan.add::<Source>("source", Default::default());
+//! let sink = plan.add::<Sink>("sink", Default::default());
+//! plan.wire(&source.out, &sink.count);
+//! plan.every("source", Duration::millis(10));
+//! plan.on("sink", "count");
+//! let options = Options { limit: Some(Duration::secs(1)), ..Options::default() };
+//! let report = Simulation::new(&plan, &registry![Source, Sink], options).unwrap().run().unwrap();
+//! assert_eq!(report.view.agents[1].counts.releases, 101);
+//! ```
+
+mod agent;
+mod check;
+mod context;
+mod door;
+mod executor;
+mod log;
+mod memory;
+mod message_type;
+mod names;
+mod os;
+mod plan;
+mod port;
+mod request;
+mod ring;
+mod router;
+mod service;
+mod simulated;
+mod stats;
+mod sync;
+mod system;
+mod tap;
+mod trace;
+
+pub use agent::{
+    Agent, AgentType, ClientEnd, Declare, Fault, InputEnd, NoParams, OutputEnd, PortInfo, Registry,
+    ServiceEnd, Step,
+};
+pub use check::{check, executors_of, wires_of};
+pub use executor::{Cause, StepFault};
+pub use log::{LogChoice, Recorder, write_note};
+pub use memory::Found;
+pub use message_type::{LARGEST_BY_VALUE, MessageType};
+pub use plan::{
+    AgentPlan, ExecutorPlan, OnDeath, Plan, TimedRequest, USUAL_DEPTH, USUAL_DEPTH_ON, Wirable, WirePlan,
+    owner, value_of,
+};
+pub use port::{
+    Direction, Envelope, Input, Output, OutputFault, Port, PortEnds, PortOptions, PortShape, PortVisit,
+    Received, Sent, WireCounts, WireId,
+};
+pub use request::{
+    AgentState, AgentView, Counts, FaultKind, PortView, Refusal, Request, SystemView, WireView,
+};
+pub use ring::{MOST_MESSAGES, Overload};
+pub use router::{Incident, robot_wires};
+pub use service::{CALLS_UNDER_WAY, Call, Client, Reply, Service, Ticket};
+pub use simulated::Simulation;
+pub use stats::{AgentStats, Figure, Histogram};
+pub use system::{CannotRun, Control, NoObserver, Observer, Options, Report, Verdict};
+pub use tap::{Heard, Tap};
+pub use types::params::Params;

@@ -1,0 +1,246 @@
+//! The thread that keeps the log: it drains the rings of the threads that run agents, encodes what it finds, and gives it to a
+//! recorder and to those who listen.
+
+#![allow(unsafe_code)]
+
+use core::sync::atomic::{AtomicBool, AtomicU64, Ordering};
+use std::sync::{Arc, Mutex, PoisonError};
+
+use types::cdr::Writer;
+use types::definition::Definition;
+use types::{AgentId, Header, Time};
+
+use crate::message_type::MessageType;
+use crate::names::Directory;
+use crate::system::CannotRun;
+use crate::tap::{Heard, Tap};
+use crate::trace;
+
+/// Where the log goes.
+pub trait Recorder: Send {
+    /// A message of the output called `topic`.
+    fn message(&mut self, topic: &str, definition: &dyn Fn() -> Definition, header: &Header, cdr: &[u8]);
+    /// What an agent, or the supervisor, says.
+    fn note(&mut self, time: Time, who: &str, text: &str);
+    /// The run is over.
+    fn finish(&mut self);
+}
+
+/// Which outputs are logged.
+#[derive(Clone)]
+pub struct LogChoice {
+    every: Arc<dyn Fn(&str, &'static MessageType) -> u32 + Send + Sync>,
+}
+
+impl Default for LogChoice {
+    /// None.
+    fn default() -> LogChoice {
+        LogChoice::by(|_, _| 0)
+    }
+}
+
+impl LogChoice {
+    /// For each output, by name and type, every how many messages one is logged; zero for none.
+    pub fn by(every: impl Fn(&str, &'static MessageType) -> u32 + Send + Sync + 'static) -> LogChoice {
+        LogChoice { every: Arc::new(every) }
+    }
+
+    pub(crate) fn every(&self, name: &str, message: &'static MessageType) -> u32 {
+        (self.every)(name, message)
+    }
+}
+
+/// Outputs by their number in the log, and who listens to them: shared by the router and the log thread, both ordinary.
+#[derive(Default)]
+pub(crate) struct Topics {
+    pub outputs: Vec<(String, &'static MessageType)>,
+    pub taps: Vec<(u32, Tap)>,
+    /// For each output, every how many messages the recorder gets one.
+    pub every: Vec<u32>,
+}
+
+/// What the log thread is told by others.
+pub(crate) struct LogShared {
+    pub topics: Mutex<Topics>,
+    notes: Mutex<Vec<(Time, String, String)>>,
+    stop: AtomicBool,
+    pub dropped: AtomicU64,
+}
+
+impl LogShared {
+    pub(crate) fn new() -> Arc<LogShared> {
+        Arc::new(LogShared {
+            topics: Mutex::default(),
+            notes: Mutex::default(),
+            stop: AtomicBool::new(false),
+            dropped: AtomicU64::new(0),
+        })
+    }
+
+    pub(crate) fn topics(&self) -> std::sync::MutexGuard<'_, Topics> {
+        self.topics.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// Adds a line from an ordinary thread.
+    pub(crate) fn note(&self, time: Time, who: &str, text: &str) {
+        let mut notes = self.notes.lock().unwrap_or_else(PoisonError::into_inner);
+        notes.push((time, who.to_owned(), text.to_owned()));
+    }
+}
+
+/// The log thread.
+pub(crate) struct LogThread {
+    shared: Arc<LogShared>,
+    thread: Option<std::thread::JoinHandle<()>>,
+}
+
+/// How long the log thread sleeps when there is nothing to do.
+const PAUSE: std::time::Duration = std::time::Duration::from_millis(2);
+
+impl LogThread {
+    pub(crate) fn start(
+        shared: Arc<LogShared>,
+        readers: Vec<trace::Reader>,
+        recorder: Option<Box<dyn Recorder>>,
+        directory: Arc<Directory>,
+    ) -> Result<LogThread, CannotRun> {
+        let mine = shared.clone();
+        let thread = std::thread::Builder::new()
+            .name("sinew-log".into())
+            .spawn(move || keep(&mine, readers, recorder, &directory))
+            .map_err(|error| CannotRun::NoThread(error.to_string()))?;
+        Ok(LogThread { shared, thread: Some(thread) })
+    }
+
+    /// Ends the thread after it has drained everything.
+    pub(crate) fn finish(mut self) -> u64 {
+        self.shared.stop.store(true, Ordering::Release);
+        if let Some(thread) = self.thread.take() {
+            // A recorder that panicked has said so; the run itself is not harmed.
+            let _ = thread.join();
+        }
+        self.shared.dropped.load(Ordering::Relaxed)
+    }
+}
+
+fn keep(
+    shared: &LogShared,
+    mut readers: Vec<trace::Reader>,
+    mut recorder: Option<Box<dyn Recorder>>,
+    directory: &Directory,
+) {
+    let mut writer = Writer::new();
+    loop {
+        let last = shared.stop.load(Ordering::Acquire);
+        let mut records = 0;
+        for reader in &mut readers {
+            records += reader.drain(|record| {
+                let topics = shared.topics();
+                handle(record, &topics, &mut recorder, directory, &mut writer);
+            });
+        }
+        let notes = core::mem::take(&mut *shared.notes.lock().unwrap_or_else(PoisonError::into_inner));
+        if let Some(recorder) = &mut recorder {
+            notes.iter().for_each(|(time, who, text)| recorder.note(*time, who, text));
+        }
+        shared.dropped.store(readers.iter().map(trace::Reader::dropped).sum(), Ordering::Relaxed);
+        if records == 0 {
+            if last {
+                break;
+            }
+            std::thread::park_timeout(PAUSE);
+        }
+    }
+    if let Some(mut recorder) = recorder {
+        recorder.finish();
+    }
+}
+
+fn handle(
+    record: trace::Record<'_>,
+    topics: &Topics,
+    recorder: &mut Option<Box<dyn Recorder>>,
+    directory: &Directory,
+    writer: &mut Writer,
+) {
+    match record {
+        trace::Record::Message { output, header, head, len, row } => {
+            let Some((name, message)) = topics.outputs.get(output as usize) else { return };
+            writer.clear();
+            // SAFETY: the record was written by the output with this number, which is of this type for as long as it lives.
+            unsafe { message.encode(head, row, len, header.stamp, writer) };
+            let every = topics.every.get(output as usize).copied().unwrap_or(0);
+            if let Some(recorder) = recorder
+                && every > 0
+                && header.sequence.is_multiple_of(every.into())
+            {
+                recorder.message(name, &message.definition, &header, writer.bytes());
+            }
+            for (_, tap) in topics.taps.iter().filter(|(number, _)| *number == output) {
+                tap.give(Heard { header, cdr: writer.bytes().to_vec() });
+            }
+        }
+        trace::Record::Note { time, agent, text, numbers } => {
+            if let Some(recorder) = recorder {
+                recorder.note(time, &name_of(directory, agent), &filled(text, numbers));
+            }
+        }
+        trace::Record::Line { time, text } => {
+            let (who, what) = text.split_once('\n').unwrap_or(("", text));
+            if let Some(recorder) = recorder {
+                recorder.note(time, who, what);
+            }
+        }
+    }
+}
+
+fn name_of(directory: &Directory, agent: AgentId) -> String {
+    directory.name(agent).map_or_else(|| "sinew".to_owned(), |name| name.as_str().to_owned())
+}
+
+/// The text with its numbers in the places of `{}`.
+fn filled(text: &str, numbers: &[f64]) -> String {
+    let mut out = String::new();
+    let mut numbers = numbers.iter();
+    let mut parts = text.split("{}");
+    out.push_str(parts.next().unwrap_or_default());
+    for part in parts {
+        match numbers.next() {
+            Some(number) => out += &format!("{}", (number * 1e6).round() / 1e6),
+            None => out.push_str("{}"),
+        }
+        out.push_str(part);
+    }
+    out
+}
+
+/// Notes a static text with up to four numbers in the places of `{}`, from within a step: it is formatted later, elsewhere.
+///
+/// ```
+/// runtime::note!("a wall {} m ahead, {} m to the left", 0.5, 1.25);
+/// ```
+#[macro_export]
+macro_rules! note {
+    ($text:literal $(, $number:expr)* $(,)?) => {
+        $crate::write_note($text, &[$($number as f64),*])
+    };
+}
+
+/// What [`note!`] calls.
+pub fn write_note(text: &'static str, numbers: &[f64]) {
+    crate::context::current(|context| {
+        context.log(|log| log.note(context.now(), context.agent(), text, &numbers[..numbers.len().min(4)]))
+    });
+}
+
+#[cfg(test)]
+mod tests {
+    use super::filled;
+
+    #[test]
+    fn numbers_take_their_places() {
+        assert_eq!(filled("at {} of {}", &[0.25, 3.0]), "at 0.25 of 3");
+        assert_eq!(filled("{}{}", &[1.0]), "1{}");
+        assert_eq!(filled("none", &[1.0]), "none");
+    }
+}

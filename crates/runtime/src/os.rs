@@ -1,0 +1,169 @@
+//! What the runtime asks of the operating system: futexes, scheduling, memory locking. Linux.
+
+#![allow(unsafe_code)]
+
+use core::sync::atomic::AtomicU32;
+use std::io;
+
+/// Waits while `word` is `expected`, until it is woken or `until` (monotonic clock, nanoseconds) has come.
+pub(crate) fn futex_wait(word: &AtomicU32, expected: u32, until: Option<i64>) {
+    let timeout = until.map(|nanos| libc::timespec {
+        tv_sec: nanos.div_euclid(1_000_000_000),
+        tv_nsec: nanos.rem_euclid(1_000_000_000),
+    });
+    let timeout = timeout.as_ref().map_or(core::ptr::null(), core::ptr::from_ref);
+    // SAFETY: `word` outlives the call, and the timeout is a valid pointer or null. FUTEX_WAIT_BITSET takes an absolute
+    // monotonic time. Whatever it answers, the caller looks at the word again.
+    unsafe {
+        libc::syscall(
+            libc::SYS_futex,
+            word.as_ptr(),
+            libc::FUTEX_WAIT_BITSET | libc::FUTEX_PRIVATE_FLAG,
+            expected,
+            timeout,
+            core::ptr::null::<u32>(),
+            u32::MAX,
+        );
+    }
+}
+
+/// Wakes the thread that waits on `word`.
+pub(crate) fn futex_wake(word: &AtomicU32) {
+    // SAFETY: `word` is a valid address; waking touches nothing else.
+    unsafe {
+        libc::syscall(libc::SYS_futex, word.as_ptr(), libc::FUTEX_WAKE | libc::FUTEX_PRIVATE_FLAG, 1);
+    }
+}
+
+fn clock(which: libc::clockid_t) -> i64 {
+    let mut now = libc::timespec { tv_sec: 0, tv_nsec: 0 };
+    // SAFETY: `now` is a valid place for the answer.
+    unsafe { libc::clock_gettime(which, &mut now) };
+    now.tv_sec * 1_000_000_000 + now.tv_nsec
+}
+
+/// The monotonic clock (ns).
+pub(crate) fn monotonic() -> i64 {
+    clock(libc::CLOCK_MONOTONIC)
+}
+
+/// The time of day since the Unix epoch (ns).
+pub(crate) fn realtime() -> i64 {
+    clock(libc::CLOCK_REALTIME)
+}
+
+/// Processor time of the calling thread (ns).
+pub(crate) fn thread_time() -> i64 {
+    clock(libc::CLOCK_THREAD_CPUTIME_ID)
+}
+
+fn checked(result: libc::c_int) -> io::Result<()> {
+    if result == 0 { Ok(()) } else { Err(io::Error::last_os_error()) }
+}
+
+/// Gives the calling thread a real-time priority (1 to 99), first in first out.
+pub(crate) fn set_fifo(priority: u8) -> io::Result<()> {
+    let param = libc::sched_param { sched_priority: priority.into() };
+    // SAFETY: zero is the calling thread; `param` is valid.
+    checked(unsafe { libc::sched_setscheduler(0, libc::SCHED_FIFO, &param) })
+}
+
+/// Lets a thread run only when nothing else wants to: for one that does not come back.
+pub(crate) fn set_idle(thread: i32) -> io::Result<()> {
+    let param = libc::sched_param { sched_priority: 0 };
+    // SAFETY: the number names a thread of this process or none; `param` is valid.
+    checked(unsafe { libc::sched_setscheduler(thread, libc::SCHED_IDLE, &param) })
+}
+
+/// The policy and priority that the calling thread has now.
+pub(crate) fn granted() -> (i32, i32) {
+    let mut param = libc::sched_param { sched_priority: 0 };
+    // SAFETY: zero is the calling thread; `param` is a valid place.
+    unsafe {
+        libc::sched_getparam(0, &mut param);
+        (libc::sched_getscheduler(0), param.sched_priority)
+    }
+}
+
+/// Keeps the calling thread on the given processors.
+pub(crate) fn set_affinity(cpus: &[usize]) -> io::Result<()> {
+    // SAFETY: an all-zero set is a valid empty one; CPU_SET checks its bounds; the size is that of the set.
+    unsafe {
+        let mut set: libc::cpu_set_t = core::mem::zeroed();
+        for cpu in cpus {
+            libc::CPU_SET(*cpu, &mut set);
+        }
+        checked(libc::sched_setaffinity(0, size_of::<libc::cpu_set_t>(), &set))
+    }
+}
+
+/// The number by which the kernel knows the calling thread.
+pub(crate) fn thread_id() -> i32 {
+    // SAFETY: the call has no arguments and cannot fail.
+    unsafe { libc::syscall(libc::SYS_gettid) as i32 }
+}
+
+/// Makes the calling thread's sleeps end when they should: ordinary threads have 50 µs of slack.
+pub(crate) fn exact_timers() {
+    // SAFETY: the option takes one number.
+    unsafe { libc::prctl(libc::PR_SET_TIMERSLACK, 1) };
+}
+
+/// Keeps all memory of the process, present and future, in place.
+pub(crate) fn lock_memory() -> io::Result<()> {
+    // SAFETY: the call takes flags only.
+    checked(unsafe { libc::mlockall(libc::MCL_CURRENT | libc::MCL_FUTURE) })
+}
+
+/// Touches the stack ahead, so that no page of it is missing later.
+#[inline(never)]
+pub(crate) fn touch_stack() {
+    const AHEAD: usize = 256 * 1024;
+    let mut pages = [0u8; AHEAD];
+    for byte in pages.iter_mut().step_by(4096) {
+        // SAFETY: a plain local; volatile so that it is not left out.
+        unsafe { core::ptr::write_volatile(byte, 1) };
+    }
+}
+
+/// Once at start: allows [`barrier_everywhere`].
+pub(crate) fn register_barrier() {
+    // SAFETY: the command takes no pointers.
+    unsafe { libc::syscall(libc::SYS_membarrier, libc::MEMBARRIER_CMD_REGISTER_PRIVATE_EXPEDITED, 0, 0) };
+}
+
+/// A full memory barrier on every processor that runs a thread of this process.
+pub(crate) fn barrier_everywhere() {
+    // SAFETY: the command takes no pointers.
+    unsafe { libc::syscall(libc::SYS_membarrier, libc::MEMBARRIER_CMD_PRIVATE_EXPEDITED, 0, 0) };
+}
+
+/// The time stamp counter where there is one, else the monotonic clock: a reading for differences, cheap enough for every step.
+#[inline(always)]
+pub(crate) fn ticks() -> u64 {
+    #[cfg(target_arch = "x86_64")]
+    // SAFETY: every x86-64 processor has the instruction.
+    unsafe {
+        core::arch::x86_64::_rdtsc()
+    }
+    #[cfg(not(target_arch = "x86_64"))]
+    {
+        monotonic() as u64
+    }
+}
+
+/// Nanoseconds in a tick of [`ticks`], measured against the monotonic clock.
+pub(crate) fn nanos_per_tick() -> f64 {
+    static RATE: std::sync::OnceLock<f64> = std::sync::OnceLock::new();
+    *RATE.get_or_init(|| {
+        if cfg!(not(target_arch = "x86_64")) {
+            return 1.0;
+        }
+        let (begin, begun) = (monotonic(), ticks());
+        while monotonic() - begin < 2_000_000 {
+            core::hint::spin_loop();
+        }
+        let (end, ended) = (monotonic(), ticks());
+        (end - begin) as f64 / ended.saturating_sub(begun).max(1) as f64
+    })
+}

@@ -1,0 +1,254 @@
+//! The one value that describes a system.
+
+use types::params::Params;
+use types::value::{Mistake, Span, Table, Value};
+use types::{Duration, Filter, Message};
+
+use crate::agent::{ClientEnd, Declare, InputEnd as To, OutputEnd as From, ServiceEnd};
+use crate::ring::Overload;
+
+/// The one value that describes a system: agents, wires, executors, what happens when, and the sections of others.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Plan {
+    /// Its name.
+    pub name: String,
+    /// Executors besides the usual ones, or in their place.
+    pub executors: Vec<ExecutorPlan>,
+    /// Agents, in the order in which they are added.
+    pub agents: Vec<AgentPlan>,
+    /// Wires.
+    pub wires: Vec<WirePlan>,
+    /// What is asked of the running system at certain times.
+    pub requests: Vec<TimedRequest>,
+    /// Sections that the runtime does not know (`world`, `robot`, `goal` …), by name. Who owns one reads it.
+    pub sections: Table,
+}
+
+/// An executor in a plan.
+#[derive(Clone, Debug, PartialEq)]
+pub struct ExecutorPlan {
+    /// Its name.
+    pub name: String,
+    /// Real-time priority from 1 to 99; nothing for an ordinary thread.
+    pub priority: Option<u8>,
+    /// The processors on which it may run; all when empty.
+    pub cpus: Vec<usize>,
+    /// How long before a release the thread stops sleeping and watches the clock instead: exact, at the cost of a processor.
+    pub spin: Duration,
+    /// Where it is written.
+    pub at: Span,
+}
+
+/// What the supervisor does with an agent that died.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum OnDeath {
+    /// Start it again: after 0.1 s, then after twice the time, up to 5 s; at most five times in a minute.
+    #[default]
+    Restart,
+    /// Leave it dead.
+    Leave,
+}
+
+/// An agent in a plan.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct AgentPlan {
+    /// Its name.
+    pub name: String,
+    /// The registered type.
+    pub kind: String,
+    /// The robot to whose ports it is wired.
+    pub robot: Option<String>,
+    /// Time between two steps; nothing for an agent that only messages make run.
+    pub period: Option<Duration>,
+    /// The shortest and the longest period that its designer allows.
+    pub period_range: Option<(Duration, Duration)>,
+    /// How soon after its release a step must be done; the period when nothing is said.
+    pub deadline: Option<Duration>,
+    /// The inputs whose messages make it run.
+    pub on: Vec<String>,
+    /// The least time between two steps that messages make it run.
+    pub min_gap: Duration,
+    /// The executor; chosen by the deadline when nothing is said.
+    pub executor: Option<String>,
+    /// What happens when it dies.
+    pub on_death: OnDeath,
+    /// How long a step may last before the watchdog takes it for one that does not return.
+    pub hang_after: Option<Duration>,
+    /// Its parameters.
+    pub params: Table,
+    /// Where it is written.
+    pub at: Span,
+}
+
+/// A wire in a plan.
+#[derive(Clone, Debug, PartialEq)]
+pub struct WirePlan {
+    /// The output, as in `sonar.filtered`; for calls the client.
+    pub from: String,
+    /// The input, as in `safety.ranges`; for calls the service.
+    pub to: String,
+    /// How many messages wait at most; the usual depth when nothing is said.
+    pub depth: Option<usize>,
+    /// What happens when there is no room; the usual policy when nothing is said.
+    pub overload: Option<Overload>,
+    /// Which messages pass.
+    pub filter: Filter,
+    /// Where it is written.
+    pub at: Span,
+}
+
+/// A request and its time.
+#[derive(Clone, Debug, PartialEq)]
+pub struct TimedRequest {
+    /// When, counted from the start.
+    pub at: Duration,
+    /// What is asked, as the command line would ask it: `["fault", "wall", "panic"]`.
+    pub words: Vec<String>,
+    /// Where it is written.
+    pub place: Span,
+}
+
+/// Depth of a wire that does not make its receiver run: newest wins.
+pub const USUAL_DEPTH: usize = 4;
+/// Depth of a wire that makes its receiver run: refuse.
+pub const USUAL_DEPTH_ON: usize = 16;
+
+impl WirePlan {
+    /// A wire with the usual depth and policy.
+    pub fn new(from: impl Into<String>, to: impl Into<String>) -> WirePlan {
+        let (from, to) = (from.into(), to.into());
+        WirePlan { from, to, depth: None, overload: None, filter: Filter::ALL, at: Span::default() }
+    }
+}
+
+impl ExecutorPlan {
+    /// An executor on all processors.
+    pub fn new(name: &str, priority: Option<u8>) -> ExecutorPlan {
+        let (name, at) = (name.to_owned(), Span::default());
+        ExecutorPlan { name, priority, cpus: Vec::new(), spin: Duration::ZERO, at }
+    }
+
+    /// The usual executors of a robot, the highest first.
+    pub fn usual() -> Vec<ExecutorPlan> {
+        [
+            ("gate", Some(90)),
+            ("receive", Some(80)),
+            ("reflex", Some(70)),
+            ("control", Some(60)),
+            ("vision", Some(50)),
+            ("ordinary", None),
+        ]
+        .map(|(name, priority)| ExecutorPlan::new(name, priority))
+        .into()
+    }
+}
+
+/// An output and an input of one type, or a client and a service: what can be wired.
+pub trait Wirable<Other> {
+    /// The names of both ends.
+    fn ends(self, other: Other) -> (String, String);
+}
+
+impl<T: Message> Wirable<To<T>> for From<T> {
+    fn ends(self, other: To<T>) -> (String, String) {
+        (self.name, other.name)
+    }
+}
+
+impl<Q: Message, A: Message> Wirable<ServiceEnd<Q, A>> for ClientEnd<Q, A> {
+    fn ends(self, other: ServiceEnd<Q, A>) -> (String, String) {
+        (self.name, other.name)
+    }
+}
+
+impl Plan {
+    /// An empty plan.
+    pub fn new(name: &str) -> Plan {
+        Plan { name: name.to_owned(), ..Plan::default() }
+    }
+
+    /// Adds an agent and gives its ports, to be wired.
+    pub fn add<A: Declare>(&mut self, name: &str, params: A::Params) -> A::Ports {
+        self.agents.push(AgentPlan {
+            name: name.to_owned(),
+            kind: A::KIND.to_owned(),
+            params: params.to_table(),
+            ..AgentPlan::default()
+        });
+        A::ports_of(name)
+    }
+
+    /// Wires an output to an input of the same type, or a client to a service. The compiler checks the types.
+    pub fn wire<E: Clone, F: Clone>(&mut self, from: &E, to: &F)
+    where
+        E: Wirable<F>,
+    {
+        let (from, to) = from.clone().ends(to.clone());
+        self.wires.push(WirePlan::new(from, to));
+    }
+
+    /// The agent with this name, to change it.
+    pub fn agent_mut(&mut self, name: &str) -> Option<&mut AgentPlan> {
+        self.agents.iter_mut().find(|agent| agent.name == name)
+    }
+
+    /// The agent with this name.
+    pub fn agent(&self, name: &str) -> Option<&AgentPlan> {
+        self.agents.iter().find(|agent| agent.name == name)
+    }
+
+    /// Gives an agent a period.
+    pub fn every(&mut self, agent: &str, period: Duration) {
+        if let Some(agent) = self.agent_mut(agent) {
+            agent.period = Some(period);
+        }
+    }
+
+    /// Makes an agent run when a message comes to one of its inputs.
+    pub fn on(&mut self, agent: &str, input: &str) {
+        if let Some(agent) = self.agent_mut(agent) {
+            agent.on.push(input.to_owned());
+        }
+    }
+
+    /// A section of somebody else's.
+    pub fn section(&self, name: &str) -> Option<&Table> {
+        self.sections.get(name).and_then(|entry| entry.value.as_table())
+    }
+
+    /// Keeps only these agents and the wires between them, and the robots that they are wired to.
+    pub fn only(&mut self, names: &[String]) -> Result<(), Mistake> {
+        for name in names {
+            if self.agent(name).is_none() {
+                let known = self.agents.iter().map(|agent| agent.name.as_str());
+                return Err(Mistake::unknown(Span::default(), "agent", name, known));
+            }
+        }
+        let robots =
+            self.sections.get("robot").and_then(|entry| entry.value.as_table()).cloned().unwrap_or_default();
+        let kept = |name: &str| names.iter().any(|kept| kept == name) || robots.get(name).is_some();
+        self.agents.retain(|agent| kept(&agent.name));
+        self.wires.retain(|wire| kept(owner(&wire.from)) && kept(owner(&wire.to)));
+        Ok(())
+    }
+}
+
+/// The agent of a port's full name.
+pub fn owner(port: &str) -> &str {
+    port.rsplit_once('.').map_or(port, |(agent, _)| agent)
+}
+
+/// The value of a plan's entry as people type it on a command line: a number, a truth value, a list, else a text.
+pub fn value_of(text: &str) -> Value {
+    if let Ok(n) = text.parse::<i64>() {
+        return Value::Int(n);
+    }
+    if let Ok(x) = text.parse::<f64>() {
+        return Value::Float(x);
+    }
+    match text {
+        "true" => Value::Bool(true),
+        "false" => Value::Bool(false),
+        _ => Value::Text(text.trim_matches('"').to_owned()),
+    }
+}

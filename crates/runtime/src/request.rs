@@ -1,0 +1,331 @@
+//! What can be asked of a running system, and what it answers.
+
+use types::params::Fields;
+use types::value::{Table, Value};
+use types::{AgentId, Duration, Filter, Time};
+
+use crate::executor::StepFault;
+use crate::plan::{AgentPlan, WirePlan};
+use crate::port::{Direction, OutputFault};
+use crate::ring::Overload;
+use crate::stats::Figure;
+
+/// A request to a running system. All of it is checked first; it is refused with a reason, or done whole.
+#[derive(Clone, Debug)]
+pub enum Request {
+    /// Adds an agent, wired to its robot where the plan says so.
+    Add(AgentPlan),
+    /// Removes an agent and its wires.
+    Remove(String),
+    /// Starts an agent anew.
+    Restart(String),
+    /// Puts another agent of the same ports in the place of one that runs.
+    Replace {
+        /// The one that runs.
+        agent: String,
+        /// The type of its successor.
+        kind: String,
+        /// The successor's parameters.
+        params: Table,
+    },
+    /// Makes a wire.
+    Wire(WirePlan),
+    /// Cuts a wire, when what is on it has arrived.
+    Unwire {
+        /// The output.
+        from: String,
+        /// The input.
+        to: String,
+    },
+    /// Sets a parameter, or `period`, `deadline`, `min_gap`.
+    Set {
+        /// Whose.
+        agent: String,
+        /// Which.
+        key: String,
+        /// To what.
+        value: Value,
+    },
+    /// Makes an agent, or an output of one, misbehave or behave again.
+    Fault {
+        /// The agent, or its output as in `h1.sonar`.
+        target: String,
+        /// How.
+        fault: FaultKind,
+    },
+    /// Sends a message to an input, or out of an output, given as CDR.
+    Send {
+        /// The port.
+        port: String,
+        /// The message.
+        cdr: Vec<u8>,
+    },
+    /// Ends the run.
+    Quit,
+    /// Several, done together or not at all.
+    All(Vec<Request>),
+}
+
+/// How somebody misbehaves on request. The names are those of PX4's failure injection.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum FaultKind {
+    /// Behaves again.
+    Ok,
+    /// Does or sends nothing.
+    Off,
+    /// Sends the same value again and again.
+    Stuck,
+    /// Sends numbers out of nowhere.
+    Garbage,
+    /// Sends numbers that are wrong but look right.
+    Wrong,
+    /// Does a quarter of its steps.
+    Slow,
+    /// Sends every other message, by chance.
+    Intermittent,
+    /// Panics in its next step.
+    Panic,
+    /// Does not return from its next step.
+    Hang,
+}
+
+impl FaultKind {
+    /// All kinds.
+    pub const ALL: [FaultKind; 9] = [
+        FaultKind::Ok,
+        FaultKind::Off,
+        FaultKind::Stuck,
+        FaultKind::Garbage,
+        FaultKind::Wrong,
+        FaultKind::Slow,
+        FaultKind::Intermittent,
+        FaultKind::Panic,
+        FaultKind::Hang,
+    ];
+
+    /// Its name on the command line.
+    pub const fn name(self) -> &'static str {
+        match self {
+            FaultKind::Ok => "ok",
+            FaultKind::Off => "off",
+            FaultKind::Stuck => "stuck",
+            FaultKind::Garbage => "garbage",
+            FaultKind::Wrong => "wrong",
+            FaultKind::Slow => "slow",
+            FaultKind::Intermittent => "intermittent",
+            FaultKind::Panic => "panic",
+            FaultKind::Hang => "hang",
+        }
+    }
+
+    /// The kind with this name.
+    pub fn named(name: &str) -> Option<FaultKind> {
+        FaultKind::ALL.into_iter().find(|kind| kind.name() == name)
+    }
+
+    /// What it means for the steps of an agent; nothing where it is a matter of what is sent.
+    pub(crate) const fn of_step(self) -> Option<StepFault> {
+        match self {
+            FaultKind::Ok => Some(StepFault::None),
+            FaultKind::Off => Some(StepFault::Off),
+            FaultKind::Slow => Some(StepFault::Slow),
+            FaultKind::Panic => Some(StepFault::Panic),
+            FaultKind::Hang => Some(StepFault::Hang),
+            _ => None,
+        }
+    }
+
+    /// What it means for an output; nothing where it is a matter of steps.
+    pub(crate) const fn of_output(self) -> Option<OutputFault> {
+        match self {
+            FaultKind::Ok => Some(OutputFault::None),
+            FaultKind::Off => Some(OutputFault::Off),
+            FaultKind::Stuck => Some(OutputFault::Stuck),
+            FaultKind::Garbage => Some(OutputFault::Garbage),
+            FaultKind::Wrong => Some(OutputFault::Wrong),
+            FaultKind::Intermittent => Some(OutputFault::Intermittent),
+            _ => None,
+        }
+    }
+}
+
+/// Why a request was refused. Nothing of it was done.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Refusal {
+    /// What is wrong.
+    pub what: String,
+    /// How to mend it.
+    pub help: Option<String>,
+}
+
+impl Refusal {
+    /// A refusal without advice.
+    pub fn new(what: impl Into<String>) -> Refusal {
+        Refusal { what: what.into(), help: None }
+    }
+
+    /// The same with advice.
+    pub fn help(mut self, help: impl Into<String>) -> Refusal {
+        self.help = Some(help.into());
+        self
+    }
+
+    /// `word` is none of `known`.
+    pub fn unknown<'a>(kind: &str, word: &str, known: impl IntoIterator<Item = &'a str>) -> Refusal {
+        types::value::Mistake::unknown(types::value::Span::default(), kind, word, known).into()
+    }
+}
+
+impl From<types::value::Mistake> for Refusal {
+    fn from(mistake: types::value::Mistake) -> Refusal {
+        Refusal { what: mistake.what, help: mistake.help }
+    }
+}
+
+impl std::fmt::Display for Refusal {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.write_str(&self.what)?;
+        self.help.as_ref().map_or(Ok(()), |help| write!(f, "; {help}"))
+    }
+}
+
+impl std::error::Error for Refusal {}
+
+/// How an agent is.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum AgentState {
+    /// It runs.
+    Running,
+    /// It died and will be started again.
+    Restarting,
+    /// It died and stays dead.
+    Dead,
+}
+
+impl AgentState {
+    /// Its name on the screen.
+    pub const fn name(self) -> &'static str {
+        match self {
+            AgentState::Running => "running",
+            AgentState::Restarting => "restarting",
+            AgentState::Dead => "dead",
+        }
+    }
+}
+
+/// What a running system says of an agent.
+#[derive(Clone, Debug)]
+pub struct AgentView {
+    /// Its number.
+    pub id: AgentId,
+    /// Its name.
+    pub name: String,
+    /// Its type.
+    pub kind: &'static str,
+    /// What the type does.
+    pub doc: &'static str,
+    /// Its executor.
+    pub executor: String,
+    /// The scheduling that was asked for, as in `fifo 70`.
+    pub asked: String,
+    /// The scheduling that was granted.
+    pub granted: String,
+    /// How it is.
+    pub state: AgentState,
+    /// Why it died last.
+    pub last_death: Option<String>,
+    /// The time between two steps, if it has a period.
+    pub period: Option<Duration>,
+    /// How soon a step must be done.
+    pub deadline: Duration,
+    /// Its parameters.
+    pub params: Table,
+    /// What is known of its parameters.
+    pub fields: Fields,
+    /// Its ports.
+    pub ports: Vec<PortView>,
+    /// What was counted.
+    pub counts: Counts,
+    /// How long steps ran (ns).
+    pub exec: Figure,
+    /// How late steps began (ns).
+    pub jitter: Figure,
+    /// From the release to the end (ns).
+    pub response: Figure,
+}
+
+/// What is counted of an agent.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Counts {
+    /// Steps.
+    pub releases: u64,
+    /// Steps that ended too late.
+    pub missed: u64,
+    /// Of those, the ones during a stall that the witness saw.
+    pub stalled: u64,
+    /// Releases that were passed over.
+    pub skipped: u64,
+    /// Steps that reported a fault.
+    pub faults: u64,
+    /// Steps that panicked.
+    pub panics: u64,
+    /// Steps that did not return.
+    pub hangs: u64,
+    /// Times that it was started again.
+    pub restarts: u64,
+}
+
+/// What a running system says of a port.
+#[derive(Clone, Debug)]
+pub struct PortView {
+    /// Its name.
+    pub name: &'static str,
+    /// What it is for.
+    pub doc: &'static str,
+    /// Which way messages go.
+    pub direction: Direction,
+    /// What goes through it.
+    pub message: &'static str,
+    /// Messages sent out of it.
+    pub sent: u64,
+}
+
+/// What a running system says of a wire.
+#[derive(Clone, Debug)]
+pub struct WireView {
+    /// The output.
+    pub from: String,
+    /// The input.
+    pub to: String,
+    /// What goes through it.
+    pub message: &'static str,
+    /// How many messages wait at most.
+    pub depth: usize,
+    /// What happens when there is no room.
+    pub overload: Overload,
+    /// Which messages pass.
+    pub filter: Filter,
+    /// Messages put into it.
+    pub sent: u64,
+    /// Messages that were displaced or dropped.
+    pub dropped: u64,
+    /// Messages that were given back.
+    pub refused: u64,
+    /// Messages taken out of it.
+    pub taken: u64,
+    /// Links that were read too late.
+    pub expired: u64,
+}
+
+/// What a running system says of itself.
+#[derive(Clone, Debug)]
+pub struct SystemView {
+    /// Its name.
+    pub name: String,
+    /// The time on its clock.
+    pub now: Time,
+    /// Its agents.
+    pub agents: Vec<AgentView>,
+    /// Its wires.
+    pub wires: Vec<WireView>,
+}

@@ -1,0 +1,343 @@
+//! The bounded one-sender, one-receiver ring behind every wire.
+//!
+//! It holds `n` messages in `n + 2` slots, and each slot has one owner at a time: the sender owns the one that it fills next,
+//! the receiver the one that it reads, and each of the `n` entries of the ring names one more. Sending exchanges the sender's
+//! slot for the one that the entry names; taking exchanges the receiver's. So a payload is written and read in place, nothing
+//! is read torn, and a sender that displaces the oldest message never waits:
+//!
+//! ```text
+//!            send: entry.swap(FULL, my slot, position) ──► free slot, or the oldest message, displaced
+//!   EMPTY(slot) ─────────────────────────────────────► FULL(slot, position)
+//!        ▲                                                  │
+//!        └──────────── take: entry.cas(EMPTY, my slot) ◄────┘
+//! ```
+//!
+//! Where the sender refuses instead of displacing, an entry is only ever changed by the side whose turn it is, and plain
+//! stores take the place of the exchanges.
+
+#![allow(unsafe_code)]
+
+use std::sync::Arc;
+
+use crate::sync::{AtomicU64, Ordering, UnsafeCell};
+
+/// What a sender does when the ring is full.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Overload {
+    /// The oldest message makes room: for readings and states.
+    #[default]
+    NewestWins,
+    /// The new message is dropped and counted: for a backlog that must stay in order.
+    OldestWins,
+    /// The new message is given back to the sender, who is told: for what must not be lost in silence.
+    Refuse,
+}
+
+impl Overload {
+    /// Its name in files.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Overload::NewestWins => "newest-wins",
+            Overload::OldestWins => "oldest-wins",
+            Overload::Refuse => "refuse",
+        }
+    }
+
+    /// The policy with this name.
+    pub fn named(name: &str) -> Option<Overload> {
+        [Overload::NewestWins, Overload::OldestWins, Overload::Refuse]
+            .into_iter()
+            .find(|policy| policy.name() == name)
+    }
+}
+
+/// What became of a message.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Pushed {
+    Stored,
+    Displaced,
+    Full,
+}
+
+/// The most messages that a ring can hold: slots are numbered in sixteen bits, and two belong to the ends.
+pub const MOST_MESSAGES: usize = (1 << 16) - 3;
+
+const FULL: u64 = 1;
+const POSITION_SHIFT: u32 = 17;
+
+fn full(slot: u16, position: u64) -> u64 {
+    FULL | u64::from(slot) << 1 | position << POSITION_SHIFT
+}
+
+fn empty(slot: u16) -> u64 {
+    u64::from(slot) << 1
+}
+
+fn slot_of(entry: u64) -> u16 {
+    (entry >> 1) as u16
+}
+
+struct Shared<T> {
+    entries: Box<[AtomicU64]>,
+    slots: Box<[UnsafeCell<T>]>,
+}
+
+// SAFETY: a slot is touched only by the end that owns its number, and numbers pass between the ends through the entries with
+// release and acquire.
+unsafe impl<T: Send> Sync for Shared<T> {}
+// SAFETY: as above; the slots hold plain `T`s.
+unsafe impl<T: Send> Send for Shared<T> {}
+
+/// The end that sends.
+pub(crate) struct Sender<T> {
+    shared: Arc<Shared<T>>,
+    position: u64,
+    index: usize,
+    slot: u16,
+    displaces: bool,
+}
+
+/// The end that takes.
+pub(crate) struct Receiver<T> {
+    shared: Arc<Shared<T>>,
+    position: u64,
+    index: usize,
+    slot: u16,
+    displaces: bool,
+}
+
+/// A ring for `capacity` messages. With `displaces` the sender may push out the oldest.
+pub(crate) fn ring<T: Default + Send>(capacity: usize, displaces: bool) -> (Sender<T>, Receiver<T>) {
+    let n = capacity.clamp(1, MOST_MESSAGES);
+    let entries = (0..n).map(|i| AtomicU64::new(empty(i as u16))).collect();
+    let slots = (0..n + 2).map(|_| UnsafeCell::new(T::default())).collect();
+    let shared = Arc::new(Shared { entries, slots });
+    let sender = Sender { shared: shared.clone(), position: 0, index: 0, slot: n as u16, displaces };
+    (sender, Receiver { shared, position: 0, index: 0, slot: n as u16 + 1, displaces })
+}
+
+impl<T> Sender<T> {
+    /// Whether a message can be sent without displacing another.
+    #[inline]
+    pub(crate) fn has_room(&self) -> bool {
+        // Pairs with the release in `Receiver::advance`: the receiver is done with the slot that the entry names.
+        self.shared.entries[self.index].load(Ordering::Acquire) & FULL == 0
+    }
+
+    /// Fills the next message in place and sends it. Where there is no room it displaces the oldest if the ring allows that,
+    /// else answers [`Pushed::Full`] without calling `fill`.
+    #[inline]
+    pub(crate) fn push(&mut self, fill: impl FnOnce(&mut T)) -> Pushed {
+        let entry = &self.shared.entries[self.index];
+        if self.displaces {
+            // SAFETY: `self.slot` is this end's own.
+            self.shared.slots[usize::from(self.slot)].with_mut(|place| fill(unsafe { &mut *place }));
+            // Release pairs with the acquire in `Receiver::advance`, for what was filled; acquire pairs with its release,
+            // for the slot that comes back.
+            let old = entry.swap(full(self.slot, self.position), Ordering::AcqRel);
+            self.slot = slot_of(old);
+            self.step();
+            if old & FULL == 0 { Pushed::Stored } else { Pushed::Displaced }
+        } else {
+            // Pairs with the release in `Receiver::advance`.
+            let old = entry.load(Ordering::Acquire);
+            if old & FULL != 0 {
+                return Pushed::Full;
+            }
+            // SAFETY: `self.slot` is this end's own.
+            self.shared.slots[usize::from(self.slot)].with_mut(|place| fill(unsafe { &mut *place }));
+            // Pairs with the acquire in `Receiver::advance`. An empty entry is the sender's to change.
+            entry.store(full(self.slot, self.position), Ordering::Release);
+            self.slot = slot_of(old);
+            self.step();
+            Pushed::Stored
+        }
+    }
+
+    fn step(&mut self) {
+        self.position += 1;
+        self.index = if self.index + 1 == self.shared.entries.len() { 0 } else { self.index + 1 };
+    }
+}
+
+impl<T> Receiver<T> {
+    /// Whether a message waits.
+    #[inline]
+    pub(crate) fn has_message(&self) -> bool {
+        self.shared.entries[self.index].load(Ordering::Relaxed) & FULL != 0
+    }
+
+    /// Takes the oldest message into this end's slot, where [`current`](Self::current) reads it. Says whether there was one.
+    #[inline]
+    pub(crate) fn advance(&mut self) -> bool {
+        loop {
+            let entry = &self.shared.entries[self.index];
+            // Pairs with the release in `Sender::push`.
+            let seen = entry.load(Ordering::Acquire);
+            if seen & FULL == 0 {
+                return false;
+            }
+            let position = seen >> POSITION_SHIFT;
+            if position != self.position {
+                // The sender has lapped this end: it has displaced everything up to a whole ring before what was seen.
+                self.seek(position + 1 - self.shared.entries.len() as u64);
+                continue;
+            }
+            if self.displaces {
+                // Release pairs with the acquire in `Sender::push`: this end has done reading the slot that it gives back.
+                if entry
+                    .compare_exchange(seen, empty(self.slot), Ordering::AcqRel, Ordering::Relaxed)
+                    .is_err()
+                {
+                    continue;
+                }
+            } else {
+                // A full entry is the receiver's to change where the sender never displaces.
+                entry.store(empty(self.slot), Ordering::Release);
+            }
+            self.slot = slot_of(seen);
+            self.seek(self.position + 1);
+            return true;
+        }
+    }
+
+    /// The message that was taken last.
+    #[inline]
+    pub(crate) fn current(&self) -> &T {
+        // SAFETY: `self.slot` is this end's own until the next `advance`, which needs it exclusively.
+        self.shared.slots[usize::from(self.slot)].with(|place| unsafe { &*place })
+    }
+
+    fn seek(&mut self, position: u64) {
+        let n = self.shared.entries.len();
+        if position == self.position + 1 {
+            self.index = if self.index + 1 == n { 0 } else { self.index + 1 };
+        } else {
+            self.index = (position % n as u64) as usize;
+        }
+        self.position = position;
+    }
+}
+
+#[cfg(all(test, not(loom)))]
+mod tests {
+    use super::*;
+    use std::collections::VecDeque;
+
+    fn drain(receiver: &mut Receiver<u32>) -> Vec<u32> {
+        std::iter::from_fn(|| receiver.advance().then(|| *receiver.current())).collect()
+    }
+
+    #[test]
+    fn the_newest_win_and_stay_in_order() {
+        let (mut sender, mut receiver) = ring(3, true);
+        let became: Vec<Pushed> = (0..5).map(|i| sender.push(|slot| *slot = i)).collect();
+        assert_eq!(
+            became,
+            [Pushed::Stored, Pushed::Stored, Pushed::Stored, Pushed::Displaced, Pushed::Displaced]
+        );
+        assert_eq!(drain(&mut receiver), [2, 3, 4]);
+    }
+
+    #[test]
+    fn a_full_ring_that_refuses_keeps_the_oldest() {
+        let (mut sender, mut receiver) = ring(2, false);
+        assert_eq!(sender.push(|slot| *slot = 1), Pushed::Stored);
+        assert_eq!(sender.push(|slot| *slot = 2), Pushed::Stored);
+        assert!(!sender.has_room());
+        assert_eq!(sender.push(|_| panic!("a refused message is not filled")), Pushed::Full);
+        assert_eq!(drain(&mut receiver), [1, 2]);
+    }
+
+    proptest::proptest! {
+        /// Against a queue that does the same with one thread.
+        #[test]
+        fn it_does_what_a_plain_queue_does(capacity in 1usize..6, displaces: bool, sends in proptest::collection::vec(proptest::bool::ANY, 0..200)) {
+            let (mut sender, mut receiver) = ring(capacity, displaces);
+            let mut model = VecDeque::new();
+            for (i, send) in sends.into_iter().enumerate() {
+                if send {
+                    let pushed = sender.push(|slot| *slot = i);
+                    proptest::prop_assert_eq!(pushed == Pushed::Stored, model.len() < capacity);
+                    if model.len() < capacity {
+                        model.push_back(i);
+                    } else if displaces {
+                        model.pop_front();
+                        model.push_back(i);
+                    }
+                } else {
+                    proptest::prop_assert_eq!(receiver.has_message(), !model.is_empty());
+                    let taken = receiver.advance().then(|| *receiver.current());
+                    proptest::prop_assert_eq!(taken, model.pop_front());
+                }
+            }
+        }
+    }
+}
+
+#[cfg(all(test, loom))]
+mod model {
+    use super::*;
+    use loom::thread;
+
+    /// Both halves of a payload are written apart: a torn read would show them apart.
+    #[derive(Default)]
+    struct Pair(u32, u32);
+
+    fn run(capacity: usize, displaces: bool, sends: u32) {
+        loom::model(move || {
+            let (mut sender, mut receiver) = ring::<Pair>(capacity, displaces);
+            let other = thread::spawn(move || {
+                let mut stored = 0;
+                for i in 1..=sends {
+                    let pushed = sender.push(|pair| {
+                        pair.0 = i;
+                        pair.1 = i;
+                    });
+                    stored += u32::from(pushed != Pushed::Full);
+                }
+                stored
+            });
+            let mut last = 0;
+            let mut taken = 0;
+            for _ in 0..2 {
+                if receiver.advance() {
+                    let pair = receiver.current();
+                    assert_eq!(pair.0, pair.1, "torn");
+                    assert!(pair.0 > last, "out of order or doubled: {} after {last}", pair.0);
+                    last = pair.0;
+                    taken += 1;
+                }
+            }
+            let stored = other.join().unwrap();
+            while receiver.advance() {
+                let pair = receiver.current();
+                assert_eq!(pair.0, pair.1, "torn");
+                assert!(pair.0 > last, "out of order or doubled");
+                last = pair.0;
+                taken += 1;
+            }
+            assert!(taken <= stored);
+            if displaces {
+                assert_eq!(last, sends, "the newest is never lost");
+            } else {
+                assert_eq!(taken, stored, "what was accepted arrives");
+            }
+        });
+    }
+
+    #[test]
+    fn newest_wins_with_one_place() {
+        run(1, true, 3);
+    }
+
+    #[test]
+    fn newest_wins_past_the_wrap() {
+        run(2, true, 4);
+    }
+
+    #[test]
+    fn refuse_past_the_wrap() {
+        run(2, false, 4);
+    }
+}

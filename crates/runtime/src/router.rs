@@ -1,0 +1,1142 @@
+//! The registry of agents, ports and wires: who is there, who talks to whom. Never on a message's path.
+//!
+//! A change is prepared here (checked, allocated), committed by each executor concerned between two of its steps, and retired
+//! here once all have answered. The order is fixed: the receiver joins before the sender adds; the sender forgets before the
+//! receiver leaves, and a receiver that is not drained yet is asked again.
+
+use core::sync::atomic::Ordering::Relaxed;
+use std::sync::Arc;
+
+use types::value::Table;
+use types::{AgentId, Duration, Filter, Name, Priority, Time};
+
+use crate::agent::{AgentType, Body, Registry};
+use crate::executor::{Answer, Cause, Change, Link, RawCause, Seat, Timing, heaps_for};
+use crate::log::{LogChoice, LogShared};
+use crate::names::Directory;
+use crate::plan::{AgentPlan, ExecutorPlan, OnDeath, USUAL_DEPTH, USUAL_DEPTH_ON, WirePlan};
+use crate::port::{Direction, InputEnd, NoSeat, OutputEnd, PortEnds, Target, WireCounts, WireId, WireSpec};
+use crate::request::{
+    AgentState, AgentView, Counts, FaultKind, PortView, Refusal, Request, SystemView, WireView,
+};
+use crate::ring::Overload;
+use crate::service::answers_for;
+use crate::stats::AgentStats;
+use crate::tap::Tap;
+
+/// Readers for which an output's memory has room besides those in the plan.
+const SPARE_SEATS: usize = 8;
+
+/// Restart waits this long after the first death, and twice as long after each that follows.
+const FIRST_PAUSE: Duration = Duration::millis(100);
+const LONGEST_PAUSE: Duration = Duration::secs(5);
+/// More deaths than this within a minute, and the agent is left dead.
+const MOST_RESTARTS: usize = 5;
+const RESTARTS_WITHIN: Duration = Duration::secs(60);
+
+/// Unless the plan says otherwise, a step hangs when it takes four times its deadline, and at least this.
+const LEAST_HANG: Duration = Duration::millis(50);
+
+/// How the router gets an executor to serve its changes: by waking its thread and waiting, or by doing it on the spot.
+pub(crate) trait Fabric {
+    /// Makes the executor serve what was given to it, or gives it time to. Says whether to go on waiting.
+    fn pump(&mut self, executor: usize) -> bool;
+}
+
+struct Known {
+    id: AgentId,
+    kind: AgentType,
+    plan: AgentPlan,
+    params: Table,
+    executor: usize,
+    slot: u32,
+    ends: Vec<PortEnds>,
+    stats: Arc<AgentStats>,
+    timing: Timing,
+    state: AgentState,
+    restart_at: Time,
+    deaths: Vec<Time>,
+    last_death: Option<String>,
+    /// Built ahead, so that a restart waits for nothing.
+    spare: Option<Box<dyn Body>>,
+}
+
+struct Wire {
+    id: WireId,
+    from: (AgentId, usize),
+    to: (AgentId, usize),
+    /// The wire of the answers, for a client and a service.
+    partner: Option<WireId>,
+    /// Whether it is the partner of another, and so is not shown.
+    is_answer: bool,
+    depth: usize,
+    overload: Overload,
+    filter: Filter,
+    counts: Arc<WireCounts>,
+}
+
+/// An executor as the router knows it.
+pub(crate) struct ExecutorKnown {
+    pub plan: ExecutorPlan,
+    pub link: Link,
+    /// The scheduling that the thread got, once it runs.
+    pub granted: String,
+    slots: Vec<bool>,
+}
+
+/// Something that the supervisor did or saw, to be told to people.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Incident {
+    /// When.
+    pub time: Time,
+    /// Which agent.
+    pub agent: String,
+    /// What.
+    pub what: String,
+}
+
+/// The registry of agents, ports and wires.
+pub(crate) struct Router {
+    name: String,
+    registry: Registry,
+    agents: Vec<Known>,
+    wires: Vec<Wire>,
+    pub executors: Vec<ExecutorKnown>,
+    next_agent: u32,
+    next_wire: u32,
+    pub incidents: Vec<Incident>,
+    /// Deaths that were read while waiting for something else.
+    died: Vec<(usize, Answer)>,
+    log: LogChoice,
+    pub log_shared: Arc<LogShared>,
+    robots: Vec<String>,
+    directory: Arc<Directory>,
+}
+
+type Reply<T> = Result<T, Refusal>;
+
+impl Router {
+    pub(crate) fn new(
+        name: &str,
+        registry: Registry,
+        executors: Vec<ExecutorKnown>,
+        robots: Vec<String>,
+        directory: Arc<Directory>,
+    ) -> Router {
+        Router {
+            name: name.to_owned(),
+            registry,
+            agents: Vec::new(),
+            wires: Vec::new(),
+            executors,
+            next_agent: 0,
+            next_wire: 0,
+            incidents: Vec::new(),
+            died: Vec::new(),
+            log: LogChoice::default(),
+            log_shared: LogShared::new(),
+            robots,
+            directory,
+        }
+    }
+
+    /// Says which outputs are logged.
+    pub(crate) fn set_log(&mut self, log: LogChoice) {
+        self.log = log;
+    }
+
+    /// Listens to an output.
+    pub(crate) fn tap(&mut self, port: &str) -> Reply<Tap> {
+        let end = self.output(port)?;
+        let mut topics = self.log_shared.topics();
+        let number = topics.outputs.iter().position(|(known, _)| known == port).unwrap_or(0);
+        let tap = Tap::new(port, (end.message_type().definition)());
+        topics.taps.push((number as u32, tap.clone()));
+        end.set_log(number as u32, 1);
+        Ok(tap)
+    }
+
+    /// Ends listening.
+    pub(crate) fn untap(&mut self, port: &str) {
+        let Ok(end) = self.output(port) else { return };
+        let mut topics = self.log_shared.topics();
+        let Some(number) = topics.outputs.iter().position(|(known, _)| known == port) else { return };
+        if let Some(at) = topics.taps.iter().position(|(tapped, _)| *tapped == number as u32) {
+            topics.taps.remove(at);
+        }
+        if !topics.taps.iter().any(|(tapped, _)| *tapped == number as u32) {
+            end.set_log(number as u32, topics.every[number]);
+        }
+    }
+
+    /// Checks a request and does it whole, or refuses it.
+    pub(crate) fn apply(&mut self, request: Request, now: Time, fabric: &mut dyn Fabric) -> Reply<()> {
+        match request {
+            Request::Add(plan) => self.add_wired(plan, now, fabric),
+            Request::Remove(agent) => self.remove(&agent, fabric),
+            Request::Restart(agent) => self.restart_now(&agent, fabric),
+            Request::Replace { agent, kind, params } => self.replace(&agent, &kind, &params, fabric),
+            Request::Wire(plan) => self.wire(&plan, fabric),
+            Request::Unwire { from, to } => self.unwire(&from, &to, fabric),
+            Request::Set { agent, key, value } => self.set(&agent, &key, value, fabric),
+            Request::Fault { target, fault } => self.fault(&target, fault, fabric),
+            Request::Send { port, cdr } => self.send(&port, cdr, fabric),
+            Request::Quit => Ok(()),
+            Request::All(requests) => self.apply_all(requests, now, fabric),
+        }
+    }
+
+    /// Does several in order; when one is refused, those before it are undone where that is possible without loss.
+    fn apply_all(&mut self, requests: Vec<Request>, now: Time, fabric: &mut dyn Fabric) -> Reply<()> {
+        let mut undo: Vec<Request> = Vec::new();
+        for request in requests {
+            let inverse = self.inverse(&request);
+            match self.apply(request, now, fabric) {
+                Ok(()) => undo.extend(inverse),
+                Err(refusal) => {
+                    for inverse in undo.into_iter().rev() {
+                        // What was just done can be undone: the names are known to be right.
+                        let _ = self.apply(inverse, now, fabric);
+                    }
+                    return Err(refusal);
+                }
+            }
+        }
+        Ok(())
+    }
+
+    /// Adds an agent and wires it to its robot; when that cannot be, it is not added.
+    fn add_wired(&mut self, plan: AgentPlan, now: Time, fabric: &mut dyn Fabric) -> Reply<()> {
+        let wires = self.robot_wires(&plan);
+        let name = plan.name.clone();
+        self.add(plan, &[], fabric)?;
+        let wires = wires.into_iter().map(Request::Wire).collect();
+        self.apply_all(wires, now, fabric).inspect_err(|_| {
+            // It is there, and nothing holds it.
+            let _ = self.remove(&name, fabric);
+        })
+    }
+
+    fn inverse(&self, request: &Request) -> Option<Request> {
+        match request {
+            Request::Add(plan) => Some(Request::Remove(plan.name.clone())),
+            Request::Wire(wire) => Some(Request::Unwire { from: wire.from.clone(), to: wire.to.clone() }),
+            Request::Unwire { from, to } => {
+                let wire = self.find_wire(from, to)?;
+                Some(Request::Wire(self.plan_of(wire)))
+            }
+            Request::Set { agent, key, .. } => {
+                let value = self.known(agent).ok()?.params.get(key)?.value.clone();
+                Some(Request::Set { agent: agent.clone(), key: key.clone(), value })
+            }
+            Request::Fault { target, .. } => {
+                Some(Request::Fault { target: target.clone(), fault: FaultKind::Ok })
+            }
+            Request::All(_)
+            | Request::Remove(_)
+            | Request::Restart(_)
+            | Request::Replace { .. }
+            | Request::Send { .. }
+            | Request::Quit => None,
+        }
+    }
+
+    pub(crate) fn agents_count(&self) -> usize {
+        self.agents.len()
+    }
+
+    /// How long a step of the agent in this slot may last before it is taken for one that does not return.
+    pub(crate) fn hang_limit(&self, executor: usize, slot: u32) -> Duration {
+        let known = self.agents.iter().find(|known| known.executor == executor && known.slot == slot);
+        known.map_or(LEAST_HANG, |known| {
+            known.plan.hang_after.unwrap_or((known.timing.deadline * 4).max(LEAST_HANG))
+        })
+    }
+
+    fn index(&self, name: &str) -> Reply<usize> {
+        self.agents.iter().position(|agent| agent.plan.name == name).ok_or_else(|| {
+            Refusal::unknown("agent", name, self.agents.iter().map(|agent| agent.plan.name.as_str()))
+        })
+    }
+
+    fn known(&self, name: &str) -> Reply<&Known> {
+        self.index(name).map(|at| &self.agents[at])
+    }
+
+    fn by_id(&self, id: AgentId) -> Option<&Known> {
+        self.agents.iter().find(|agent| agent.id == id)
+    }
+
+    /// The agent and the place of the port named `agent.port`.
+    fn port(&self, name: &str) -> Reply<(usize, usize)> {
+        let (agent, port) = name.rsplit_once('.').ok_or_else(|| {
+            Refusal::new(format!("\"{name}\" is no port")).help("write it as in \"sonar.filtered\"")
+        })?;
+        let agent = self.index(agent)?;
+        let ports = &self.agents[agent].kind.ports;
+        let place = ports.iter().position(|known| known.name == port).ok_or_else(|| {
+            Refusal::unknown(
+                &format!("port of {}", self.agents[agent].plan.name),
+                port,
+                ports.iter().map(|known| known.name),
+            )
+        })?;
+        Ok((agent, place))
+    }
+
+    fn executor_for(&self, plan: &AgentPlan, timing: Timing) -> Reply<usize> {
+        let name = match &plan.executor {
+            Some(name) => name.as_str(),
+            None if timing.deadline <= Duration::ZERO => "ordinary",
+            None if timing.deadline <= Duration::millis(10) => "reflex",
+            None if timing.deadline <= Duration::millis(100) => "control",
+            None => "ordinary",
+        };
+        self.executors.iter().position(|executor| executor.plan.name == name).ok_or_else(|| {
+            Refusal::unknown("executor", name, self.executors.iter().map(|e| e.plan.name.as_str()))
+        })
+    }
+
+    /// Adds an agent. `readers` is how many wires the plan leads from each of its ports.
+    pub(crate) fn add(
+        &mut self,
+        plan: AgentPlan,
+        readers: &[usize],
+        fabric: &mut dyn Fabric,
+    ) -> Reply<AgentId> {
+        if self.agents.iter().any(|agent| agent.plan.name == plan.name) {
+            return Err(Refusal::new(format!("there is already an agent \"{}\"", plan.name))
+                .help("names are given once"));
+        }
+        let kind = self
+            .registry
+            .get(&plan.kind)
+            .ok_or_else(|| {
+                Refusal::unknown("type of agent", &plan.kind, self.registry.types().iter().map(|t| t.kind))
+            })?
+            .clone();
+        let (_, params) = kind.read_params(&plan.params).map_err(first)?;
+        let mut body = kind.build(&plan.params).map_err(first)?;
+        let timing = timing_of(&plan)?;
+        let executor = self.executor_for(&plan, timing)?;
+        let id = AgentId(self.next_agent);
+
+        let mut ends = Vec::new();
+        body.visit_ports(&mut |visit| {
+            let seats = readers.get(ends.len()).copied().unwrap_or(0) + SPARE_SEATS;
+            let made = visit.port.create(&visit.options, seats);
+            visit.port.bind(&made);
+            if let Some(output) = &made.output {
+                output.set_sender(id);
+            }
+            ends.push(made);
+        });
+        let mut on = Vec::new();
+        for input in &plan.on {
+            let place = kind
+                .ports
+                .iter()
+                .position(|port| port.name == input)
+                .filter(|place| ends[*place].input.is_some());
+            let Some(place) = place else {
+                let known = kind.ports.iter().filter(|port| port.shape.input.is_some()).map(|port| port.name);
+                return Err(Refusal::unknown(&format!("input of {}", plan.name), input, known));
+            };
+            on.extend(ends[place].input.clone());
+        }
+        self.number_outputs(&plan.name, &kind, &ends);
+
+        self.next_agent += 1;
+        let slots = &mut self.executors[executor].slots;
+        let slot = slots.iter().position(|taken| !taken).unwrap_or(slots.len());
+        if slot == slots.len() {
+            slots.push(true);
+        } else {
+            slots[slot] = true;
+        }
+        let room = slots.len();
+        let slot = slot as u32;
+        let stats = Arc::new(AgentStats::default());
+        let seat = Seat {
+            id,
+            name: Name::new(&plan.name),
+            body: Some(body),
+            ends: ends.clone(),
+            on,
+            timing,
+            stats: stats.clone(),
+            next_release: Time::NEVER,
+            alarm: Time::NEVER,
+            last_step: Time(i64::MIN / 2),
+            started: false,
+            fault: Default::default(),
+        };
+        let spare = kind.build(&plan.params).ok();
+        self.agents.push(Known {
+            id,
+            kind,
+            params,
+            executor,
+            slot,
+            ends,
+            stats,
+            timing,
+            state: AgentState::Running,
+            restart_at: Time::NEVER,
+            deaths: Vec::new(),
+            last_death: None,
+            spare,
+            plan,
+        });
+        self.directory.remember(id, &self.agents[self.agents.len() - 1].plan.name);
+        // The order first: a seat that is due must have its place.
+        self.commit_order(executor, fabric)?;
+        let seats = Vec::with_capacity((room * 2).max(8));
+        self.commit(executor, Change::Seat { slot, seat: Some(Box::new(seat)), seats, room }, fabric)?;
+        Ok(id)
+    }
+
+    /// Gives each output its number in the log, the same as before where an agent of that name was there before.
+    fn number_outputs(&self, agent: &str, kind: &AgentType, ends: &[PortEnds]) {
+        let mut topics = self.log_shared.topics();
+        for (port, made) in kind.ports.iter().zip(ends) {
+            let Some(output) = &made.output else { continue };
+            let name = format!("{agent}.{}", port.name);
+            let every = self.log.every(&name, output.message_type());
+            let known = topics
+                .outputs
+                .iter()
+                .position(|(known, message)| *known == name && *message == output.message_type());
+            let number = known.unwrap_or_else(|| {
+                topics.outputs.push((name, output.message_type()));
+                topics.every.push(every);
+                topics.outputs.len() - 1
+            });
+            let tapped = topics.taps.iter().any(|(tapped, _)| *tapped == number as u32);
+            output.set_log(number as u32, if tapped { 1 } else { every });
+        }
+    }
+
+    /// The wires that join an agent to its robot.
+    fn robot_wires(&self, plan: &AgentPlan) -> Vec<WirePlan> {
+        let (Some(robot), Some(kind)) = (&plan.robot, self.registry.get(&plan.kind)) else {
+            return Vec::new();
+        };
+        robot_wires(plan, kind, robot)
+    }
+
+    fn remove(&mut self, name: &str, fabric: &mut dyn Fabric) -> Reply<()> {
+        let at = self.index(name)?;
+        if self.robots.iter().any(|robot| robot == name) {
+            return Err(Refusal::new(format!(
+                "\"{name}\" is a robot, and the gate in front of it cannot be removed"
+            )));
+        }
+        let (id, executor, slot) = (self.agents[at].id, self.agents[at].executor, self.agents[at].slot);
+        let wires: Vec<WireId> = self
+            .wires
+            .iter()
+            .filter(|wire| wire.from.0 == id || wire.to.0 == id)
+            .map(|wire| wire.id)
+            .collect();
+        // First nobody sends to it any more, then it stops, then it is gone from the wires to others.
+        for wire in &wires {
+            self.cut(*wire, true, fabric)?;
+        }
+        self.commit(executor, Change::Unseat { slot, seat: None }, fabric)?;
+        self.agents.retain(|agent| agent.id != id);
+        self.executors[executor].slots[slot as usize] = false;
+        self.commit_order(executor, fabric)
+    }
+
+    fn restart_now(&mut self, name: &str, fabric: &mut dyn Fabric) -> Reply<()> {
+        let at = self.index(name)?;
+        let body = self.agents[at].kind.build(&self.agents[at].params).map_err(first)?;
+        self.install(at, body, fabric)
+    }
+
+    fn replace(&mut self, name: &str, kind: &str, params: &Table, fabric: &mut dyn Fabric) -> Reply<()> {
+        let at = self.index(name)?;
+        let new = self
+            .registry
+            .get(kind)
+            .ok_or_else(|| {
+                Refusal::unknown("type of agent", kind, self.registry.types().iter().map(|t| t.kind))
+            })?
+            .clone();
+        let old = &self.agents[at].kind;
+        let same = old.ports.len() == new.ports.len()
+            && old.ports.iter().zip(&new.ports).all(|(a, b)| {
+                a.name == b.name
+                    && a.shape.direction == b.shape.direction
+                    && a.shape.input == b.shape.input
+                    && a.shape.output == b.shape.output
+            });
+        if !same {
+            return Err(Refusal::new(format!(
+                "a \"{kind}\" has other ports than the \"{}\" in whose place it would come",
+                old.kind
+            ))
+            .help("remove the one and add the other"));
+        }
+        let (_, table) = new.read_params(params).map_err(first)?;
+        let body = new.build(params).map_err(first)?;
+        let known = &mut self.agents[at];
+        known.spare = new.build(params).ok();
+        known.kind = new;
+        known.params = table;
+        known.plan.kind = kind.to_owned();
+        known.plan.params = params.clone();
+        self.install(at, body, fabric)
+    }
+
+    /// Puts a new instance in the place of the present one, in front of the same mailboxes and routes.
+    fn install(&mut self, at: usize, mut body: Box<dyn Body>, fabric: &mut dyn Fabric) -> Reply<()> {
+        let known = &mut self.agents[at];
+        let mut ends = known.ends.iter();
+        body.visit_ports(&mut |visit| {
+            if let Some(end) = ends.next() {
+                visit.port.bind(end);
+            }
+        });
+        known.state = AgentState::Running;
+        known.restart_at = Time::NEVER;
+        known.stats.restarts.store(known.stats.restarts.load(Relaxed) + 1, Relaxed);
+        let (executor, slot) = (known.executor, known.slot);
+        self.commit(executor, Change::Body { slot, body: Some(body) }, fabric)
+    }
+
+    fn set(
+        &mut self,
+        name: &str,
+        key: &str,
+        value: types::value::Value,
+        fabric: &mut dyn Fabric,
+    ) -> Reply<()> {
+        let at = self.index(name)?;
+        if matches!(key, "period" | "deadline" | "min_gap") {
+            return self.set_timing(at, key, &value, fabric);
+        }
+        let known = &self.agents[at];
+        let mut params = known.params.clone();
+        params.set(key, value);
+        let (boxed, table) = known.kind.read_params(&params).map_err(first)?;
+        let (executor, slot) = (known.executor, known.slot);
+        let spare = known.kind.build(&table).ok();
+        self.commit(executor, Change::Params { slot, params: boxed }, fabric)?;
+        let known = &mut self.agents[at];
+        known.plan.params = table.clone();
+        known.params = table;
+        known.spare = spare;
+        Ok(())
+    }
+
+    fn set_timing(
+        &mut self,
+        at: usize,
+        key: &str,
+        value: &types::value::Value,
+        fabric: &mut dyn Fabric,
+    ) -> Reply<()> {
+        let text = value
+            .as_text()
+            .ok_or_else(|| Refusal::new(format!("{key} must be a time such as \"250ms\", not {value}")))?;
+        let span: Duration =
+            text.parse().map_err(|error| Refusal::new(format!("{key} is \"{text}\": {error}")))?;
+        let known = &self.agents[at];
+        let mut plan = known.plan.clone();
+        match key {
+            "period" => plan.period = Some(span),
+            "deadline" => plan.deadline = Some(span),
+            _ => plan.min_gap = span,
+        }
+        if let (Some(period), Some((least, most))) = (plan.period, plan.period_range)
+            && !(least..=most).contains(&period)
+        {
+            return Err(Refusal::new(format!(
+                "the period of {} must lie from {least} to {most}, not {period}",
+                plan.name
+            )));
+        }
+        let timing = timing_of(&plan)?;
+        let (executor, slot) = (known.executor, known.slot);
+        self.commit(executor, Change::Timing { slot, timing }, fabric)?;
+        let known = &mut self.agents[at];
+        known.plan = plan;
+        known.timing = timing;
+        Ok(())
+    }
+
+    fn fault(&mut self, target: &str, fault: FaultKind, fabric: &mut dyn Fabric) -> Reply<()> {
+        if let Ok(at) = self.index(target) {
+            let known = &self.agents[at];
+            if let Some(step) = fault.of_step() {
+                let (executor, slot) = (known.executor, known.slot);
+                if fault == FaultKind::Ok {
+                    known
+                        .ends
+                        .iter()
+                        .filter_map(|end| end.output.as_ref())
+                        .for_each(|o| o.set_fault(Default::default()));
+                }
+                return self.commit(executor, Change::Fault { slot, fault: step }, fabric);
+            }
+            let output = fault.of_output().unwrap_or_default();
+            known.ends.iter().filter_map(|end| end.output.as_ref()).for_each(|end| end.set_fault(output));
+            return Ok(());
+        }
+        let (agent, port) = self.port(target).map_err(|refusal| {
+            if target.contains('.') { refusal } else { self.index(target).err().unwrap_or(refusal) }
+        })?;
+        let end = self.agents[agent].ends[port].output.clone();
+        match (end, fault.of_output()) {
+            (Some(end), Some(fault)) => {
+                end.set_fault(fault);
+                Ok(())
+            }
+            (None, _) => {
+                Err(Refusal::new(format!("{target} sends nothing")).help("name an output, or the agent"))
+            }
+            (_, None) => {
+                Err(Refusal::new(format!("an output cannot {}", fault.name())).help("name the agent"))
+            }
+        }
+    }
+
+    fn send(&mut self, port: &str, bytes: Vec<u8>, fabric: &mut dyn Fabric) -> Reply<()> {
+        let (agent, place) = self.port(port)?;
+        let Some(end) = self.agents[agent].ends[place].output.clone() else {
+            return Err(Refusal::new(format!("{port} takes messages but sends none")).help(
+                "name the output from which the message shall go, and all who are wired to it get it",
+            ));
+        };
+        let executor = self.agents[agent].executor;
+        let done = self.commit_and_get(executor, Change::Send { end, bytes, result: None }, fabric)?;
+        match done {
+            Change::Send { result: Some(Err(error)), .. } => Err(Refusal::new(error.to_string())),
+            _ => Ok(()),
+        }
+    }
+
+    fn find_wire(&self, from: &str, to: &str) -> Option<&Wire> {
+        let (from, to) = (self.port(from).ok()?, self.port(to).ok()?);
+        let (from, to) = ((self.agents[from.0].id, from.1), (self.agents[to.0].id, to.1));
+        self.wires.iter().find(|wire| wire.from == from && wire.to == to && !wire.is_answer)
+    }
+
+    fn plan_of(&self, wire: &Wire) -> WirePlan {
+        let name = |(id, port): (AgentId, usize)| {
+            self.by_id(id).map_or_else(String::new, |known| {
+                format!("{}.{}", known.plan.name, known.kind.ports[port].name)
+            })
+        };
+        let mut plan = WirePlan::new(name(wire.from), name(wire.to));
+        (plan.depth, plan.overload, plan.filter) = (Some(wire.depth), Some(wire.overload), wire.filter);
+        plan
+    }
+
+    /// Makes a wire.
+    pub(crate) fn wire(&mut self, plan: &WirePlan, fabric: &mut dyn Fabric) -> Reply<()> {
+        let (from, to) = (self.port(&plan.from)?, self.port(&plan.to)?);
+        if self.find_wire(&plan.from, &plan.to).is_some() {
+            return Err(Refusal::new(format!("{} is already wired to {}", plan.from, plan.to)));
+        }
+        let (out_port, in_port) =
+            (&self.agents[from.0].kind.ports[from.1], &self.agents[to.0].kind.ports[to.1]);
+        match (out_port.shape.direction, in_port.shape.direction) {
+            (Direction::Output, Direction::Input) => {
+                self.check_types(plan, from, to)?;
+                self.join(from, to, plan, plan.filter, false, fabric).map(drop)
+            }
+            (Direction::Client, Direction::Service) => {
+                self.check_types(plan, from, to)?;
+                self.check_types(plan, to, from)?;
+                let filter = answers_for(self.agents[from.0].id);
+                let answers = self.join(to, from, plan, filter, true, fabric)?;
+                let calls = self.join(from, to, plan, plan.filter, false, fabric)?;
+                if let Some(wire) = self.wires.iter_mut().find(|wire| wire.id == calls) {
+                    wire.partner = Some(answers);
+                }
+                Ok(())
+            }
+            (Direction::Input, Direction::Output) | (Direction::Service, Direction::Client) => {
+                Err(Refusal::new(format!("{} and {} are the wrong way round", plan.from, plan.to))
+                    .help(format!("\"{}\" = [\"{}\"]", plan.to, plan.from)))
+            }
+            (a, b) => {
+                Err(Refusal::new(format!("{} is an {}, {} an {}", plan.from, a.name(), plan.to, b.name()))
+                    .help("a wire leads from an output to an input, or from a client to a service"))
+            }
+        }
+    }
+
+    fn check_types(&self, plan: &WirePlan, from: (usize, usize), to: (usize, usize)) -> Reply<()> {
+        let out = self.agents[from.0].ends[from.1].output.as_ref().map(|end| end.message_type());
+        let into = self.agents[to.0].ends[to.1].input.as_ref().map(|end| end.message_type());
+        match (out, into) {
+            (Some(out), Some(into)) if out == into => Ok(()),
+            (Some(out), Some(into)) => {
+                let fits: Vec<String> = self.agents[from.0]
+                    .kind
+                    .ports
+                    .iter()
+                    .filter(|port| port.shape.output == Some(into))
+                    .map(|port| format!("{}.{}", self.agents[from.0].plan.name, port.name))
+                    .collect();
+                let refusal = Refusal::new(format!(
+                    "{} sends {}, {} takes {}",
+                    plan.from,
+                    out.short_name(),
+                    plan.to,
+                    into.short_name()
+                ));
+                Err(if fits.is_empty() {
+                    refusal
+                } else {
+                    refusal.help(format!("did you mean {}?", fits.join(" or ")))
+                })
+            }
+            _ => Err(Refusal::new(format!("{} cannot be wired to {}", plan.from, plan.to))),
+        }
+    }
+
+    /// Makes one ring wire: the receiver joins, then the sender adds.
+    fn join(
+        &mut self,
+        from: (usize, usize),
+        to: (usize, usize),
+        plan: &WirePlan,
+        filter: Filter,
+        is_answer: bool,
+        fabric: &mut dyn Fabric,
+    ) -> Reply<WireId> {
+        let (sender, receiver) = (&self.agents[from.0], &self.agents[to.0]);
+        let (Some(output), Some(input)) =
+            (sender.ends[from.1].output.clone(), receiver.ends[to.1].input.clone())
+        else {
+            return Err(Refusal::new(format!("{} cannot be wired to {}", plan.from, plan.to)));
+        };
+        let port = &receiver.kind.ports[to.1];
+        let answers = port.shape.direction == Direction::Client;
+        let wakes = answers || receiver.plan.on.iter().any(|on| on == port.name);
+        let depth = plan.depth.unwrap_or(if wakes { USUAL_DEPTH_ON } else { USUAL_DEPTH });
+        let overload = plan.overload.unwrap_or(if wakes { Overload::Refuse } else { Overload::NewestWins });
+        if depth == 0 || depth > crate::ring::MOST_MESSAGES {
+            let most = crate::ring::MOST_MESSAGES;
+            return Err(Refusal::new(format!("a wire holds from 1 to {most} messages, not {depth}")));
+        }
+        let target = Target {
+            executor: receiver.executor as u32,
+            slot: receiver.slot,
+            door: self.executors[receiver.executor].link.door.clone(),
+            wakes,
+        };
+        let id = WireId(self.next_wire);
+        let counts = Arc::new(WireCounts::default());
+        let spec =
+            WireSpec { id, sender: sender.id, depth, overload, filter, target, counts: counts.clone() };
+        let mut priorities: Vec<Priority> = sender.kind.ports[from.1].options.priorities().collect();
+        priorities.sort_unstable_by(|a, b| b.cmp(a));
+        if priorities.is_empty() {
+            priorities.push(Priority::Normal);
+        }
+        let (from_id, to_id) = ((sender.id, from.1), (receiver.id, to.1));
+        let routes = self.wires.iter().filter(|wire| wire.from == from_id).count();
+        let lanes = self.wires.iter().filter(|wire| wire.to == to_id).count() * Priority::ALL.len();
+        let prepared = output.prepare(&spec, &priorities, routes, lanes).map_err(|NoSeat { seats }| {
+            Refusal::new(format!("{} has readers on all {seats} seats of its memory", plan.from))
+        })?;
+        let (sender_executor, receiver_executor, slot) = (sender.executor, receiver.executor, receiver.slot);
+        self.next_wire += 1;
+        self.commit(receiver_executor, Change::Join { end: input, lanes: prepared.lanes, slot }, fabric)?;
+        self.commit(sender_executor, Change::Route { end: output, route: prepared.route }, fabric)?;
+        self.wires.push(Wire {
+            id,
+            from: from_id,
+            to: to_id,
+            partner: None,
+            is_answer,
+            depth,
+            overload,
+            filter,
+            counts,
+        });
+        if sender_executor == receiver_executor && wakes {
+            self.commit_order(sender_executor, fabric)?;
+        }
+        Ok(id)
+    }
+
+    fn unwire(&mut self, from: &str, to: &str, fabric: &mut dyn Fabric) -> Reply<()> {
+        self.port(from)?;
+        self.port(to)?;
+        let Some(wire) = self.find_wire(from, to) else {
+            let ends = self.port(from)?;
+            let id = (self.agents[ends.0].id, ends.1);
+            let known: Vec<String> =
+                self.wires.iter().filter(|wire| wire.from == id).map(|w| self.plan_of(w).to).collect();
+            let refusal = Refusal::new(format!("{from} is not wired to {to}"));
+            return Err(if known.is_empty() {
+                refusal
+            } else {
+                refusal.help(format!("it is wired to {}", known.join(", ")))
+            });
+        };
+        let (id, partner) = (wire.id, wire.partner);
+        self.cut(id, false, fabric)?;
+        partner.map_or(Ok(()), |partner| self.cut(partner, false, fabric))
+    }
+
+    /// Cuts one ring wire: the sender forgets, then the receiver leaves, when it is drained unless that is not waited for.
+    fn cut(&mut self, id: WireId, force: bool, fabric: &mut dyn Fabric) -> Reply<()> {
+        let Some(wire) = self.wires.iter().find(|wire| wire.id == id) else { return Ok(()) };
+        let (from, to) = (wire.from, wire.to);
+        let end =
+            |id: AgentId, port: usize| self.by_id(id).map(|known| (known.executor, known.ends[port].clone()));
+        if let Some((executor, PortEnds { output: Some(end), .. })) = end(from.0, from.1) {
+            let into = end.forgetting_box();
+            self.commit(executor, Change::Forget { end, wire: id, into }, fabric)?;
+        }
+        let end =
+            |id: AgentId, port: usize| self.by_id(id).map(|known| (known.executor, known.ends[port].clone()));
+        if let Some((executor, PortEnds { input: Some(end), .. })) = end(to.0, to.1) {
+            self.leave(executor, end, id, force, fabric)?;
+        }
+        self.wires.retain(|wire| wire.id != id);
+        Ok(())
+    }
+
+    fn leave(
+        &mut self,
+        executor: usize,
+        end: Arc<dyn InputEnd>,
+        wire: WireId,
+        force: bool,
+        fabric: &mut dyn Fabric,
+    ) -> Reply<()> {
+        // A receiver that takes nothing any more is not waited for: what lies in its mailbox is counted as dropped.
+        const PATIENCE: usize = 100;
+        for attempt in 0.. {
+            let into = end.leaving_box();
+            let change = Change::Leave { end: end.clone(), wire, into, force: force || attempt >= PATIENCE };
+            if self.commit_and_get(executor, change, fabric).is_ok_and(
+                |change| matches!(change, Change::Leave { force, .. } if force || attempt < PATIENCE),
+            ) {
+                return Ok(());
+            }
+        }
+        Ok(())
+    }
+
+    /// Computes the data-flow order of an executor and gives it to it.
+    fn commit_order(&mut self, executor: usize, fabric: &mut dyn Fabric) -> Reply<()> {
+        let order = self.data_flow_order(executor);
+        let slots = self.executors[executor].slots.len();
+        let mut ranks = vec![u32::MAX; slots];
+        for (rank, slot) in order.iter().enumerate() {
+            ranks[*slot as usize] = rank as u32;
+        }
+        let words = vec![0; slots.div_ceil(64).max(1)];
+        let (releases, due) = heaps_for(slots);
+        self.commit(executor, Change::Order { order, ranks, words, releases, due }, fabric)
+    }
+
+    /// The slots of an executor's agents so that senders stand before receivers; cycles are broken by name.
+    fn data_flow_order(&self, executor: usize) -> Vec<u32> {
+        let mut members: Vec<&Known> =
+            self.agents.iter().filter(|agent| agent.executor == executor).collect();
+        members.sort_by(|a, b| a.plan.name.cmp(&b.plan.name));
+        let place = |id: AgentId| members.iter().position(|member| member.id == id);
+        let mut behind: Vec<Vec<usize>> = vec![Vec::new(); members.len()];
+        let mut before = vec![0usize; members.len()];
+        for wire in self.wires.iter().filter(|wire| !wire.is_answer) {
+            if let (Some(a), Some(b)) = (place(wire.from.0), place(wire.to.0))
+                && a != b
+            {
+                behind[a].push(b);
+                before[b] += 1;
+            }
+        }
+        let mut order = Vec::with_capacity(members.len());
+        let mut done = vec![false; members.len()];
+        while order.len() < members.len() {
+            // The first by name that waits for nobody; in a cycle, the first by name.
+            let next = (0..members.len()).filter(|i| !done[*i]).min_by_key(|i| (before[*i] > 0, *i));
+            let Some(next) = next else { break };
+            done[next] = true;
+            order.push(members[next].slot);
+            for after in &behind[next] {
+                before[*after] = before[*after].saturating_sub(1);
+            }
+        }
+        order
+    }
+
+    fn commit(&mut self, executor: usize, change: Change, fabric: &mut dyn Fabric) -> Reply<()> {
+        self.commit_and_get(executor, change, fabric).map(drop)
+    }
+
+    /// Gives a change to an executor and waits until it has answered. What comes back is freed here.
+    fn commit_and_get(&mut self, executor: usize, change: Change, fabric: &mut dyn Fabric) -> Reply<Change> {
+        let busy = || {
+            Refusal::new("the executor does not answer").help("an agent in it does not return from its step")
+        };
+        self.executors[executor].link.changes.push(change).map_err(|_| busy())?;
+        loop {
+            let go_on = fabric.pump(executor);
+            while let Ok(answer) = self.executors[executor].link.answers.pop() {
+                match answer {
+                    Answer::Done(change) => return Ok(change),
+                    Answer::NotDrained(change) => {
+                        drop(change);
+                        return Err(Refusal::new("not drained yet"));
+                    }
+                    died @ Answer::Died { .. } => self.died.push((executor, died)),
+                }
+            }
+            if !go_on {
+                return Err(busy());
+            }
+        }
+    }
+
+    /// Looks for deaths, and starts again who is due. Gives the time at which it wants to look again.
+    pub(crate) fn supervise(&mut self, now: Time, fabric: &mut dyn Fabric) -> Time {
+        for executor in 0..self.executors.len() {
+            while let Ok(answer) = self.executors[executor].link.answers.pop() {
+                self.died.push((executor, answer));
+            }
+        }
+        for (executor, answer) in core::mem::take(&mut self.died) {
+            if let Answer::Died { slot, id, time, cause, body } = answer {
+                self.bury(executor, slot, id, time, cause);
+                drop(body);
+            }
+        }
+        let mut next = Time::NEVER;
+        for at in 0..self.agents.len() {
+            let known = &mut self.agents[at];
+            if known.state != AgentState::Restarting {
+                continue;
+            }
+            if known.restart_at > now {
+                next = next.min(known.restart_at);
+                continue;
+            }
+            let body = known.spare.take().map_or_else(|| known.kind.build(&known.params), Ok);
+            match body {
+                Ok(body) => {
+                    let name = known.plan.name.clone();
+                    match self.install(at, body, fabric) {
+                        Ok(()) => self.incidents.push(Incident {
+                            time: now,
+                            agent: name,
+                            what: "started again".into(),
+                        }),
+                        Err(refusal) => {
+                            self.incidents.push(Incident {
+                                time: now,
+                                agent: name,
+                                what: format!("not started again: {refusal}"),
+                            });
+                            self.agents[at].state = AgentState::Dead;
+                        }
+                    }
+                    let known = &mut self.agents[at];
+                    known.spare = known.kind.build(&known.params).ok();
+                }
+                Err(_) => known.state = AgentState::Dead,
+            }
+        }
+        next
+    }
+
+    fn bury(&mut self, executor: usize, slot: u32, id: AgentId, time: Time, cause: RawCause) {
+        let _ = executor;
+        let cause = match cause {
+            RawCause::Fault(fault) => Cause::Fault(fault),
+            RawCause::Hang => Cause::Hang,
+            RawCause::Panic(record, payload) => {
+                drop(payload);
+                Cause::Panic(record.to_text())
+            }
+        };
+        let Some(known) = self.agents.iter_mut().find(|known| known.id == id && known.slot == slot) else {
+            return;
+        };
+        known.last_death = Some(cause.to_string());
+        known.deaths.retain(|death| *death + RESTARTS_WITHIN > time);
+        known.deaths.push(time);
+        let deaths = known.deaths.len();
+        let mut what = cause.to_string();
+        if known.plan.on_death == OnDeath::Leave {
+            known.state = AgentState::Dead;
+            what += "; left dead, as its plan says";
+        } else if deaths > MOST_RESTARTS {
+            known.state = AgentState::Dead;
+            what += &format!("; left dead after {MOST_RESTARTS} restarts within a minute");
+        } else {
+            known.state = AgentState::Restarting;
+            let pause = Duration((FIRST_PAUSE.0 << (deaths - 1).min(16)).min(LONGEST_PAUSE.0));
+            known.restart_at = time + pause;
+        }
+        self.incidents.push(Incident { time, agent: known.plan.name.clone(), what });
+    }
+
+    /// Ends all agents.
+    pub(crate) fn stop_all(&mut self, fabric: &mut dyn Fabric) {
+        for executor in 0..self.executors.len() {
+            // An executor that does not answer is left behind; there is nobody to tell any more.
+            let _ = self.commit(executor, Change::Stop, fabric);
+        }
+    }
+
+    fn output(&self, port: &str) -> Reply<Arc<dyn OutputEnd>> {
+        let (agent, place) = self.port(port)?;
+        let known = &self.agents[agent];
+        let end = known.ends[place].output.clone();
+        end.ok_or_else(|| {
+            let outputs: Vec<&str> =
+                known.kind.ports.iter().filter(|p| p.shape.output.is_some()).map(|p| p.name).collect();
+            Refusal::new(format!("{port} sends nothing")).help(format!(
+                "{} sends: {}",
+                known.plan.name,
+                outputs.join(", ")
+            ))
+        })
+    }
+
+    /// What there is, as people ask for it.
+    pub(crate) fn view(&self, now: Time) -> SystemView {
+        let agents = self.agents.iter().map(|known| self.view_agent(known)).collect();
+        let wires =
+            self.wires.iter().filter(|wire| !wire.is_answer).map(|wire| self.view_wire(wire)).collect();
+        SystemView { name: self.name.clone(), now, agents, wires }
+    }
+
+    fn view_agent(&self, known: &Known) -> AgentView {
+        let stats = &known.stats;
+        let executor = &self.executors[known.executor];
+        let ports = known.kind.ports.iter().zip(&known.ends).map(|(port, end)| PortView {
+            name: port.name,
+            doc: port.doc,
+            direction: port.shape.direction,
+            message: port.shape.input.or(port.shape.output).map_or("", |message| message.short_name()),
+            sent: end.output.as_ref().map_or(0, |output| output.sent()),
+        });
+        AgentView {
+            id: known.id,
+            name: known.plan.name.clone(),
+            kind: known.kind.kind,
+            doc: known.kind.doc,
+            executor: executor.plan.name.clone(),
+            asked: executor.plan.priority.map_or("ordinary".into(), |priority| format!("fifo {priority}")),
+            granted: executor.granted.clone(),
+            state: known.state,
+            last_death: known.last_death.clone(),
+            period: (known.timing.period > Duration::ZERO).then_some(known.timing.period),
+            deadline: known.timing.deadline,
+            params: known.params.clone(),
+            fields: known.kind.params.clone(),
+            ports: ports.collect(),
+            counts: Counts {
+                releases: stats.releases.load(Relaxed),
+                missed: stats.missed.load(Relaxed),
+                stalled: stats.stalled.load(Relaxed),
+                skipped: stats.skipped.load(Relaxed),
+                faults: stats.faults.load(Relaxed),
+                panics: stats.panics.load(Relaxed),
+                hangs: stats.hangs.load(Relaxed),
+                restarts: stats.restarts.load(Relaxed),
+            },
+            exec: stats.exec.figure(),
+            jitter: stats.jitter.figure(),
+            response: stats.response.figure(),
+        }
+    }
+
+    fn view_wire(&self, wire: &Wire) -> WireView {
+        let plan = self.plan_of(wire);
+        let message = self
+            .by_id(wire.from.0)
+            .and_then(|known| known.ends[wire.from.1].output.as_ref())
+            .map_or("", |end| end.message_type().short_name());
+        WireView {
+            from: plan.from,
+            to: plan.to,
+            message,
+            depth: wire.depth,
+            overload: wire.overload,
+            filter: wire.filter,
+            sent: wire.counts.sent.load(Relaxed),
+            dropped: wire.counts.dropped.load(Relaxed),
+            refused: wire.counts.refused.load(Relaxed),
+            taken: wire.counts.taken.load(Relaxed),
+            expired: wire.counts.expired.load(Relaxed),
+        }
+    }
+
+    /// The running system as a plan that would start it.
+    pub(crate) fn to_plan(&self) -> (Vec<AgentPlan>, Vec<WirePlan>) {
+        let agents =
+            self.agents.iter().map(|known| AgentPlan { params: known.params.clone(), ..known.plan.clone() });
+        let wires = self.wires.iter().filter(|wire| !wire.is_answer).map(|wire| self.plan_of(wire));
+        (agents.collect(), wires.collect())
+    }
+}
+
+impl ExecutorKnown {
+    pub(crate) fn new(plan: ExecutorPlan, link: Link) -> ExecutorKnown {
+        ExecutorKnown { plan, link, granted: "simulated".into(), slots: Vec::new() }
+    }
+}
+
+/// The wires that join an agent of this type to the robot: each port that names a port of the robot.
+pub fn robot_wires(plan: &AgentPlan, kind: &AgentType, robot: &str) -> Vec<WirePlan> {
+    let mut wires = Vec::new();
+    for port in &kind.ports {
+        let Some(name) = port.options.robot else { continue };
+        let (own, robots) = (format!("{}.{}", plan.name, port.name), format!("{robot}.{name}"));
+        wires.push(match port.shape.direction {
+            Direction::Input => WirePlan::new(robots, own),
+            _ => WirePlan::new(own, robots),
+        });
+    }
+    for wire in &mut wires {
+        wire.at = plan.at;
+    }
+    wires
+}
+
+fn first(mistakes: Vec<types::value::Mistake>) -> Refusal {
+    let mut mistakes = mistakes.into_iter();
+    let mut refusal = mistakes.next().map_or_else(|| Refusal::new("the parameters are wrong"), Refusal::from);
+    for more in mistakes {
+        refusal.what = format!("{}; {more}", refusal.what);
+    }
+    refusal
+}
+
+/// The usual deadline of an agent that only messages make run.
+const DEADLINE_ON: Duration = Duration::millis(100);
+
+/// Reads and checks when an agent runs.
+pub(crate) fn timing_of(plan: &AgentPlan) -> Result<Timing, Refusal> {
+    let name = &plan.name;
+    let period = plan.period.unwrap_or(Duration::ZERO);
+    if plan.period.is_some_and(|period| period <= Duration::ZERO) {
+        return Err(Refusal::new(format!("the period of {name} must be longer than zero, not {period}")));
+    }
+    if plan.period.is_none() && plan.on.is_empty() {
+        return Err(Refusal::new(format!("{name} would never run"))
+            .help("give it a period, or name the inputs it is on"));
+    }
+    let usual = plan.period.unwrap_or(DEADLINE_ON);
+    let deadline = plan.deadline.unwrap_or(usual);
+    if deadline <= Duration::ZERO || plan.period.is_some_and(|period| deadline > period) {
+        return Err(Refusal::new(format!(
+            "the deadline of {name} must lie between zero and its period ({usual}), not {deadline}"
+        )));
+    }
+    Ok(Timing { period, deadline, min_gap: plan.min_gap })
+}

@@ -1,0 +1,345 @@
+//! Simulated time: one thread plays all executors, in the order of time, executor priority and data flow. Same plan, same
+//! requests, same bytes.
+
+#![allow(unsafe_code)]
+
+use core::sync::atomic::{AtomicBool, Ordering};
+use std::sync::Arc;
+use std::sync::mpsc::{Receiver, sync_channel};
+use std::time::Duration as HostDuration;
+
+use types::{Duration, Time};
+
+use crate::agent::Registry;
+use crate::context::{Context, install_panic_hook};
+use crate::executor::{Core, Ended, Running};
+use crate::log::LogThread;
+use crate::os;
+use crate::plan::Plan;
+use crate::request::{Refusal, Request};
+use crate::router::{Incident, Router};
+use crate::system::{Ask, Built, CannotRun, Control, Options, Report, Still, Verdict, asks, build};
+use crate::trace;
+
+/// How long a step may keep the host busy before the run is given up.
+const HOST_LIMIT: Duration = Duration::secs(10);
+/// So many steps at one instant for each agent are taken for an endless loop.
+const STEPS_AT_ONCE: u64 = 10_000;
+
+/// A system in simulated time, ready to run.
+pub struct Simulation {
+    built: Built,
+    control: Control,
+    asks: Receiver<Ask>,
+    options: Options,
+    timed: Vec<(Time, Request, String)>,
+}
+
+impl Simulation {
+    /// Builds what a plan describes.
+    pub fn new(plan: &Plan, registry: &Registry, options: Options) -> Result<Simulation, CannotRun> {
+        install_panic_hook();
+        let built = build(plan, registry, options.log.clone(), Time::ZERO)?;
+        let (control, asks) = asks();
+        let mut timed = Vec::new();
+        for request in &plan.requests {
+            let parsed = (options.parse)(&request.words).map_err(CannotRun::Refused)?;
+            timed.push((Time::ZERO + request.at, parsed, request.words.join(" ")));
+        }
+        timed.sort_by_key(|(at, _, _)| *at);
+        Ok(Simulation { built, control, asks, options, timed })
+    }
+
+    /// A way to ask the system while it runs, from another thread.
+    pub fn control(&self) -> Control {
+        self.control.clone()
+    }
+
+    /// Runs to the end. The steps run on a thread of their own, so that one that does not return can be told.
+    pub fn run(self) -> Result<Report, CannotRun> {
+        let running: Vec<Arc<Running>> = self.built.cores.iter().map(|core| core.running.clone()).collect();
+        let directory = self.built.directory.clone();
+        let (done, ended) = sync_channel(1);
+        let over = Arc::new(AtomicBool::new(false));
+        let thread = std::thread::Builder::new()
+            .name("sinew-simulation".into())
+            .spawn(move || {
+                // Whoever waits may have given up.
+                let _ = done.send(play(self));
+            })
+            .map_err(|error| CannotRun::NoThread(error.to_string()))?;
+        let mut watched: Option<(usize, u64)> = None;
+        let mut since = os::monotonic();
+        loop {
+            match ended.recv_timeout(HostDuration::from_millis(200)) {
+                Ok(report) => {
+                    over.store(true, Ordering::Relaxed);
+                    let _ = thread.join();
+                    return report;
+                }
+                Err(std::sync::mpsc::RecvTimeoutError::Disconnected) => {
+                    return Err(CannotRun::NoThread("the simulation's own thread panicked".into()));
+                }
+                Err(std::sync::mpsc::RecvTimeoutError::Timeout) => {}
+            }
+            let in_step = running.iter().position(|running| running.slot.load(Ordering::Relaxed) != 0);
+            let seen = in_step.map(|at| (at, running[at].steps.load(Ordering::Relaxed)));
+            if seen != watched || seen.is_none() {
+                (watched, since) = (seen, os::monotonic());
+            } else if os::monotonic() - since > HOST_LIMIT.0 {
+                let agent = in_step.map(|at| running[at].agent.load(Ordering::Relaxed)).unwrap_or(u32::MAX);
+                let agent = directory
+                    .name(types::AgentId(agent))
+                    .map_or("an agent".into(), |name| name.as_str().to_owned());
+                return Err(CannotRun::Stuck { agent, limit: HOST_LIMIT });
+            }
+        }
+    }
+}
+
+struct Player {
+    router: Router,
+    cores: Vec<Core>,
+    /// Executors, the highest priority first.
+    order: Vec<usize>,
+    context: Box<Context>,
+    now: Time,
+    /// Until when an executor is kept busy by an agent that hangs.
+    blocked: Vec<Time>,
+    /// Agents that hang: when they are given up, their executor and slot.
+    hung: Vec<(Time, usize, u32)>,
+    incidents_seen: usize,
+}
+
+fn play(simulation: Simulation) -> Result<Report, CannotRun> {
+    let Simulation { built, control, asks, options, timed } = simulation;
+    // The run's own end of the way to ask would keep it from ever being closed.
+    drop(control);
+    let Built { router, cores, directory } = built;
+    let (writer, reader) = trace::ring(true);
+    let Options { limit, speed, recorder, mut observer, .. } = options;
+    let log_shared = router.log_shared.clone();
+    let log = LogThread::start(log_shared, vec![reader], recorder, directory.clone())?;
+    let mut order: Vec<usize> = (0..cores.len()).collect();
+    order.sort_by_key(|at| core::cmp::Reverse(router.executors[*at].plan.priority.map_or(0, i32::from)));
+    let context = Context::new(Some(writer), directory);
+    let blocked = vec![Time::ZERO; cores.len()];
+    let mut player = Player {
+        router,
+        cores,
+        order,
+        context,
+        now: Time::ZERO,
+        blocked,
+        hung: Vec::new(),
+        incidents_seen: 0,
+    };
+
+    let entered = player.context.enter();
+    let begun = os::monotonic();
+    let end = limit.map_or(Time::NEVER, |limit| Time::ZERO + limit);
+    let mut timed = timed.into_iter().peekable();
+    let mut next_look = Time::ZERO;
+    let mut quits = false;
+    let ended = loop {
+        while let Some((at, request, words)) = timed.next_if(|(at, _, _)| *at <= player.now) {
+            quits |= matches!(request, Request::Quit);
+            let said = match player.apply(request) {
+                Ok(()) => format!("asked: {words}"),
+                Err(refusal) => format!("asked: {words}; refused: {refusal}"),
+            };
+            player.router.incidents.push(Incident { time: at, agent: "plan".into(), what: said });
+        }
+        if quits {
+            break "the plan said quit".into();
+        }
+        if let Some(reason) = player.serve(&asks) {
+            break reason;
+        }
+        player.instant()?;
+        let next_supervision = player.supervise();
+        if player.now >= next_look {
+            next_look = player.now + observer.every().max(Duration::millis(1));
+            if let Verdict::End(reason) = observer.observe(player.now, &player.router.incidents) {
+                break reason;
+            }
+        }
+        let next_timed = timed.peek().map_or(Time::NEVER, |(at, _, _)| *at);
+        let next = player.next_event().min(next_timed).min(next_look).min(next_supervision).min(end);
+        if player.now >= end {
+            break "the time is over".into();
+        }
+        if next == Time::NEVER {
+            break "nothing is left to do".into();
+        }
+        if let Some(reason) = player.pace(next, speed, begun, &asks) {
+            break reason;
+        }
+        player.now = next.max(player.now);
+    };
+    player.stop();
+    drop(entered);
+    let Player { router, context, now, .. } = player;
+    // The writer goes first, so that the log thread finds the ring at rest.
+    drop(context);
+    let log_dropped = log.finish();
+    Ok(Report {
+        ended,
+        time: now.since_start(),
+        wall: (os::monotonic() - begun) as f64 * 1e-9,
+        view: router.view(now),
+        incidents: router.incidents,
+        log_dropped,
+    })
+}
+
+impl Player {
+    /// Does everything that is to be done at this instant.
+    fn instant(&mut self) -> Result<(), CannotRun> {
+        let mut steps = 0u64;
+        'again: loop {
+            for place in 0..self.order.len() {
+                let at = self.order[place];
+                if self.blocked[at] > self.now {
+                    continue;
+                }
+                let core = &mut self.cores[at];
+                core.look_at_door(&self.context, self.now);
+                if let Some(job) = core.next(self.now) {
+                    // SAFETY: the core lives in this thread's own array, and nobody else takes it.
+                    let ended = unsafe { Core::run(core, &self.context, job, self.now, false, || true) };
+                    if let Some(Ended::AskedToHang(slot)) = ended {
+                        self.hang(at, slot);
+                    }
+                    steps += 1;
+                    if steps > STEPS_AT_ONCE * (1 + self.router.agents_count() as u64) {
+                        return Err(self.endless());
+                    }
+                    // The step may have woken somebody of higher priority.
+                    continue 'again;
+                }
+            }
+            return Ok(());
+        }
+    }
+
+    /// An agent is stuck in virtual time: its executor does nothing until the watchdog has given it up.
+    fn hang(&mut self, executor: usize, slot: u32) {
+        let limit = self.router.hang_limit(executor, slot);
+        self.blocked[executor] = self.now + limit;
+        self.hung.push((self.now + limit, executor, slot));
+    }
+
+    fn give_up_hung(&mut self) {
+        let now = self.now;
+        let due: Vec<_> = self.hung.iter().filter(|(at, _, _)| *at <= now).copied().collect();
+        self.hung.retain(|(at, _, _)| *at > now);
+        for (_, executor, slot) in due {
+            self.cores[executor].give_up(slot, now);
+        }
+    }
+
+    /// The agents that ran last, when time does not go on.
+    fn endless(&mut self) -> CannotRun {
+        let mut agents = Vec::new();
+        for _ in 0..64 {
+            for place in 0..self.order.len() {
+                let core = &mut self.cores[self.order[place]];
+                core.look_at_door(&self.context, self.now);
+                let Some(job) = core.next(self.now) else { continue };
+                if let Some(seat) = core.seats[job.slot as usize].as_ref() {
+                    let name = seat.name.as_str().to_owned();
+                    if !agents.contains(&name) {
+                        agents.push(name);
+                    }
+                }
+                // SAFETY: as in `instant`.
+                unsafe { Core::run(core, &self.context, job, self.now, false, || true) };
+                break;
+            }
+        }
+        CannotRun::Endless { time: self.now, agents }
+    }
+
+    fn apply(&mut self, request: Request) -> Result<(), Refusal> {
+        let mut fabric = Still { cores: &mut self.cores, context: &self.context, now: self.now };
+        self.router.apply(request, self.now, &mut fabric)
+    }
+
+    fn supervise(&mut self) -> Time {
+        self.give_up_hung();
+        let mut fabric = Still { cores: &mut self.cores, context: &self.context, now: self.now };
+        let next = self.router.supervise(self.now, &mut fabric);
+        for incident in &self.router.incidents[self.incidents_seen..] {
+            self.context.log(|log| log.line(incident.time, &incident.agent, &incident.what));
+        }
+        self.incidents_seen = self.router.incidents.len();
+        next
+    }
+
+    /// Answers what was asked from outside. Says why the run ends, if it does.
+    fn serve(&mut self, asks: &Receiver<Ask>) -> Option<String> {
+        while let Ok(ask) = asks.try_recv() {
+            if let Some(reason) = self.answer(ask) {
+                return Some(reason);
+            }
+        }
+        None
+    }
+
+    fn answer(&mut self, ask: Ask) -> Option<String> {
+        match ask {
+            Ask::Request(request, answer) => {
+                let quits = matches!(request, Request::Quit);
+                let said = format!("{request:?}");
+                let result = self.apply(request);
+                let outcome =
+                    result.as_ref().err().map_or(String::new(), |refusal| format!("; refused: {refusal}"));
+                self.context.log(|log| log.line(self.now, "control", &format!("asked: {said}{outcome}")));
+                // Whoever asked may be gone.
+                let _ = answer.send(result);
+                return quits.then(|| "asked to quit".into());
+            }
+            Ask::View(answer) => drop(answer.send(self.router.view(self.now))),
+            Ask::Plan(answer) => drop(answer.send(self.router.to_plan())),
+            Ask::Tap(port, answer) => drop(answer.send(self.router.tap(&port))),
+            Ask::Untap(port) => self.router.untap(&port),
+        }
+        None
+    }
+
+    fn next_event(&self) -> Time {
+        let hung = self.hung.iter().map(|(at, _, _)| *at).min().unwrap_or(Time::NEVER);
+        let releases =
+            self.cores.iter().zip(&self.blocked).map(|(core, blocked)| core.next_release().max(*blocked));
+        releases.min().unwrap_or(Time::NEVER).min(hung)
+    }
+
+    /// Where the run shall not be faster than a clock, waits for it, and answers what is asked meanwhile.
+    fn pace(&mut self, next: Time, speed: Option<f64>, begun: i64, asks: &Receiver<Ask>) -> Option<String> {
+        let speed = speed.filter(|speed| *speed > 0.0)?;
+        let due = begun + (next.seconds() / speed * 1e9) as i64;
+        loop {
+            let left = due - os::monotonic();
+            if left <= 0 {
+                return None;
+            }
+            match asks.recv_timeout(HostDuration::from_nanos(left as u64)) {
+                Ok(ask) => {
+                    if let Some(reason) = self.answer(ask) {
+                        return Some(reason);
+                    }
+                }
+                Err(std::sync::mpsc::RecvTimeoutError::Timeout) => return None,
+                Err(std::sync::mpsc::RecvTimeoutError::Disconnected) => {
+                    std::thread::park_timeout(HostDuration::from_nanos(left as u64));
+                }
+            }
+        }
+    }
+
+    fn stop(&mut self) {
+        let mut fabric = Still { cores: &mut self.cores, context: &self.context, now: self.now };
+        self.router.stop_all(&mut fabric);
+    }
+}

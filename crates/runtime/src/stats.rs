@@ -1,0 +1,182 @@
+//! Figures of what agents do: written by the thread that runs them with plain stores, read by anybody at any time.
+
+use core::sync::atomic::{AtomicU32, AtomicU64, Ordering::Relaxed};
+
+use types::Duration;
+
+/// Steps of the histogram in each doubling.
+const PER_OCTAVE: u32 = 8;
+/// The first step holds all up to this many nanoseconds.
+const FIRST: u32 = 5;
+const OCTAVES: u32 = 36;
+const BUCKETS: usize = (OCTAVES * PER_OCTAVE) as usize;
+
+/// A figure of spans of time, kept by one writer.
+#[derive(Debug)]
+pub struct Histogram {
+    n: AtomicU64,
+    last: AtomicU64,
+    sum: AtomicU64,
+    min: AtomicU64,
+    max: AtomicU64,
+    buckets: Box<[AtomicU32]>,
+}
+
+/// A figure as it is shown, in nanoseconds.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Figure {
+    /// How many values.
+    pub n: u64,
+    /// The last.
+    pub last: f64,
+    /// The least.
+    pub min: f64,
+    /// The mean.
+    pub mean: f64,
+    /// Half are at most this.
+    pub p50: f64,
+    /// Of a hundred, ninety-nine are at most this.
+    pub p99: f64,
+    /// Of a thousand, all but one are at most this.
+    pub p999: f64,
+    /// The greatest, unfiltered.
+    pub max: f64,
+}
+
+impl Default for Histogram {
+    fn default() -> Histogram {
+        Histogram {
+            n: AtomicU64::new(0),
+            last: AtomicU64::new(0),
+            sum: AtomicU64::new(0),
+            min: AtomicU64::new(u64::MAX),
+            max: AtomicU64::new(0),
+            buckets: (0..BUCKETS).map(|_| AtomicU32::new(0)).collect(),
+        }
+    }
+}
+
+fn bucket(nanos: u64) -> usize {
+    let octave = 63 - (nanos | 1).leading_zeros();
+    if octave < FIRST {
+        return 0;
+    }
+    let within = (nanos >> (octave - 3)) as u32 & (PER_OCTAVE - 1);
+    (((octave - FIRST) * PER_OCTAVE + within) as usize).min(BUCKETS - 1)
+}
+
+/// The upper end of a bucket (ns).
+fn upper(bucket: usize) -> f64 {
+    let (octave, within) = (bucket as u32 / PER_OCTAVE + FIRST, bucket as u32 % PER_OCTAVE);
+    (1u64 << octave) as f64 * (1.0 + f64::from(within + 1) / f64::from(PER_OCTAVE))
+}
+
+impl Histogram {
+    /// Adds a span. Only one thread may.
+    #[inline]
+    pub fn add(&self, nanos: u64) {
+        let add =
+            |counter: &AtomicU64, by: u64| counter.store(counter.load(Relaxed).wrapping_add(by), Relaxed);
+        add(&self.n, 1);
+        add(&self.sum, nanos);
+        self.last.store(nanos, Relaxed);
+        if nanos > self.max.load(Relaxed) {
+            self.max.store(nanos, Relaxed);
+        }
+        if nanos < self.min.load(Relaxed) {
+            self.min.store(nanos, Relaxed);
+        }
+        let bucket = &self.buckets[bucket(nanos)];
+        bucket.store(bucket.load(Relaxed).wrapping_add(1), Relaxed);
+    }
+
+    /// What it shows now. Percentiles are the upper ends of steps of an eighth of a doubling.
+    pub fn figure(&self) -> Figure {
+        let n = self.n.load(Relaxed);
+        if n == 0 {
+            return Figure::default();
+        }
+        let counts: Vec<u64> = self.buckets.iter().map(|bucket| bucket.load(Relaxed).into()).collect();
+        let counted: u64 = counts.iter().sum();
+        let (min, max) = (self.min.load(Relaxed) as f64, self.max.load(Relaxed) as f64);
+        let at = |share: f64| {
+            let wanted = (share * counted as f64).ceil() as u64;
+            let mut seen = 0;
+            let found = counts.iter().position(|count| {
+                seen += count;
+                seen >= wanted
+            });
+            found.map_or(max, upper).clamp(min, max)
+        };
+        Figure {
+            n,
+            last: self.last.load(Relaxed) as f64,
+            min,
+            mean: self.sum.load(Relaxed) as f64 / n as f64,
+            p50: at(0.5),
+            p99: at(0.99),
+            p999: at(0.999),
+            max,
+        }
+    }
+}
+
+/// What is counted of an agent.
+#[derive(Debug, Default)]
+pub struct AgentStats {
+    /// Steps that were due or made to run by a message.
+    pub releases: AtomicU64,
+    /// Steps that ended behind their deadline.
+    pub missed: AtomicU64,
+    /// Of those, the ones during which the witness saw a stall that nobody in the process caused.
+    pub stalled: AtomicU64,
+    /// Releases that were passed over because the step before them had not ended.
+    pub skipped: AtomicU64,
+    /// Steps that reported a fault.
+    pub faults: AtomicU64,
+    /// Steps that panicked.
+    pub panics: AtomicU64,
+    /// Steps that did not return.
+    pub hangs: AtomicU64,
+    /// Times that the agent was started again.
+    pub restarts: AtomicU64,
+    /// How long steps ran (ns).
+    pub exec: Histogram,
+    /// How late steps began (ns).
+    pub jitter: Histogram,
+    /// From the release to the end of the step (ns).
+    pub response: Histogram,
+}
+
+/// Adds one to a counter that one thread writes.
+#[inline]
+pub(crate) fn bump(counter: &AtomicU64) {
+    counter.store(counter.load(Relaxed) + 1, Relaxed);
+}
+
+/// A span that is not negative, in nanoseconds.
+pub(crate) fn nanos(span: Duration) -> u64 {
+    span.0.max(0) as u64
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    proptest::proptest! {
+        /// The percentile of the histogram lies within one step of the true one.
+        #[test]
+        fn percentiles_are_right_to_one_step(mut values in proptest::collection::vec(0u64..10_000_000_000, 1..300)) {
+            let histogram = Histogram::default();
+            values.iter().for_each(|value| histogram.add(*value));
+            values.sort_unstable();
+            let figure = histogram.figure();
+            proptest::prop_assert_eq!(figure.max, values[values.len() - 1] as f64);
+            proptest::prop_assert_eq!(figure.min, values[0] as f64);
+            for (share, shown) in [(0.5, figure.p50), (0.99, figure.p99)] {
+                let truth = values[((share * values.len() as f64).ceil() as usize).max(1) - 1] as f64;
+                proptest::prop_assert!(shown >= truth * 0.999 && shown <= (truth * 1.13).max(37.0), "{} {}", shown, truth);
+            }
+        }
+    }
+}

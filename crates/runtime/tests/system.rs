@@ -1,0 +1,459 @@
+//! Whole systems in simulated time.
+
+use runtime::{
+    Agent, Client, Direction, Fault, FaultKind, Input, Options, Output, Params, Plan, Refusal, Registry,
+    Reply, Request, Service, Simulation, Step, TimedRequest, WirePlan, registry,
+};
+use std::sync::{Arc, Mutex};
+use types::messages::{Image, Twist};
+use types::value::{Span, Value};
+use types::{Duration, Time};
+
+/// Counts up.
+#[derive(Agent)]
+struct Source {
+    /// The count, as a speed.
+    out: Output<Twist>,
+    params: SourceParams,
+    n: f64,
+}
+
+/// How it counts.
+#[derive(Clone, Debug, Params)]
+struct SourceParams {
+    /// By how much.
+    #[param(default = 1.0, min = 0.0)]
+    by: f64,
+}
+
+impl Agent for Source {
+    fn step(&mut self, _: &mut Step) -> Result<(), Fault> {
+        self.n += self.params.by;
+        self.out.send(Twist::new(self.n, 0.0));
+        Ok(())
+    }
+}
+
+/// Passes on what comes, turned by one.
+#[derive(Agent)]
+struct Relay {
+    /// What comes.
+    from: Input<Twist>,
+    /// What goes.
+    to: Output<Twist>,
+}
+
+impl Agent for Relay {
+    fn step(&mut self, _: &mut Step) -> Result<(), Fault> {
+        while let Some(twist) = self.from.take() {
+            let on = Twist::new(twist.linear, twist.angular + 1.0);
+            self.to.send(on);
+        }
+        Ok(())
+    }
+}
+
+static HEARD: Mutex<Vec<(String, Time, Twist)>> = Mutex::new(Vec::new());
+
+/// Writes down what comes, under a name of its own.
+#[derive(Agent)]
+struct Sink {
+    /// What comes.
+    count: Input<Twist>,
+    params: SinkParams,
+}
+
+/// Under which name.
+#[derive(Clone, Debug, Default, Params)]
+struct SinkParams {
+    /// The name of the test.
+    test: String,
+}
+
+impl Agent for Sink {
+    fn step(&mut self, step: &mut Step) -> Result<(), Fault> {
+        while let Some(twist) = self.count.take() {
+            HEARD.lock().unwrap().push((self.params.test.clone(), step.now, *twist));
+        }
+        Ok(())
+    }
+}
+
+fn heard(test: &str) -> Vec<(Time, Twist)> {
+    let heard = HEARD.lock().unwrap();
+    heard.iter().filter(|(name, _, _)| name == test).map(|(_, time, twist)| (*time, *twist)).collect()
+}
+
+fn sink(test: &str) -> SinkParams {
+    SinkParams { test: test.to_owned() }
+}
+
+fn parse(words: &[String]) -> Result<Request, Refusal> {
+    let words: Vec<&str> = words.iter().map(String::as_str).collect();
+    Ok(match words[..] {
+        ["fault", target, kind] => Request::Fault {
+            target: target.into(),
+            fault: FaultKind::named(kind).ok_or_else(|| Refusal::new("no such fault"))?,
+        },
+        ["set", agent, key, value] => {
+            Request::Set { agent: agent.into(), key: key.into(), value: runtime::value_of(value) }
+        }
+        ["remove", agent] => Request::Remove(agent.into()),
+        ["restart", agent] => Request::Restart(agent.into()),
+        ["unwire", from, to] => Request::Unwire { from: from.into(), to: to.into() },
+        ["wire", from, to] => Request::Wire(WirePlan::new(from, to)),
+        _ => return Err(Refusal::new("no such request")),
+    })
+}
+
+fn at(millis: i64, words: &str) -> TimedRequest {
+    let words = words.split(' ').map(str::to_owned).collect();
+    TimedRequest { at: Duration::millis(millis), words, place: Span::default() }
+}
+
+fn options(millis: i64) -> Options {
+    Options { limit: Some(Duration::millis(millis)), parse, ..Options::default() }
+}
+
+fn types() -> Registry {
+    registry![Source, Relay, Sink, Asker, Answerer, Loop, Painter, Viewer]
+}
+
+/// source → relay → sink, the source every 10 ms.
+fn chain(test: &str) -> Plan {
+    let mut plan = Plan::new(test);
+    let source = plan.add::<Source>("source", SourceParams::default());
+    let relay = plan.add::<Relay>("relay", Default::default());
+    let end = plan.add::<Sink>("sink", sink(test));
+    plan.wire(&source.out, &relay.from);
+    plan.wire(&relay.to, &end.count);
+    plan.every("source", Duration::millis(10));
+    plan.on("relay", "from");
+    plan.on("sink", "count");
+    plan
+}
+
+#[test]
+fn a_chain_delivers_each_message_once_in_order_at_the_instant_it_was_sent() {
+    let report = Simulation::new(&chain("chain"), &types(), options(1000)).unwrap().run().unwrap();
+    let heard = heard("chain");
+    assert_eq!(heard.len(), 101);
+    for (i, (time, twist)) in heard.iter().enumerate() {
+        assert_eq!(
+            (*time, *twist),
+            (Time::ZERO + Duration::millis(10 * i as i64), Twist::new(i as f64 + 1.0, 1.0))
+        );
+    }
+    assert_eq!(report.ended, "the time is over");
+    assert!(
+        report.view.wires.iter().all(|wire| (wire.sent, wire.dropped, wire.taken) == (101, 0, 101)),
+        "{:?}",
+        report.view.wires
+    );
+}
+
+#[test]
+fn a_panic_is_survived_and_the_agent_comes_back() {
+    let mut plan = chain("panic");
+    plan.requests = vec![at(200, "fault relay panic")];
+    let report = Simulation::new(&plan, &types(), options(1000)).unwrap().run().unwrap();
+    let relay = report.view.agents.iter().find(|agent| agent.name == "relay").unwrap();
+    assert_eq!((relay.counts.panics, relay.counts.restarts), (1, 1));
+    assert!(relay.last_death.as_ref().unwrap().contains("asked to panic"), "{:?}", relay.last_death);
+    let source = report.view.agents.iter().find(|agent| agent.name == "source").unwrap();
+    assert_eq!(source.counts.releases, 101, "the others miss nothing");
+    let numbers: Vec<i64> = heard("panic").iter().map(|(_, twist)| twist.linear as i64).collect();
+    // It was dead for 0.1 s: ten messages wait in its mailbox of sixteen, and none is lost.
+    assert_eq!(numbers, (1..=101).collect::<Vec<_>>());
+}
+
+#[test]
+fn a_step_that_hangs_is_given_up_and_the_agent_comes_back() {
+    let mut plan = chain("hang");
+    plan.requests = vec![at(200, "fault relay hang")];
+    plan.agent_mut("relay").unwrap().executor = Some("reflex".into());
+    let report = Simulation::new(&plan, &types(), options(2000)).unwrap().run().unwrap();
+    let relay = report.view.agents.iter().find(|agent| agent.name == "relay").unwrap();
+    assert_eq!((relay.counts.hangs, relay.counts.restarts), (1, 1), "{:?}", report.incidents);
+    assert!(heard("hang").last().unwrap().0 > Time::from_seconds(1.9));
+}
+
+#[test]
+fn an_agent_that_dies_again_and_again_is_left_dead() {
+    let mut plan = chain("again");
+    plan.requests = (0..60).map(|i| at(100 + i * 400, "fault relay panic")).collect();
+    let report = Simulation::new(&plan, &types(), options(30_000)).unwrap().run().unwrap();
+    let relay = report.view.agents.iter().find(|agent| agent.name == "relay").unwrap();
+    assert_eq!(relay.counts.restarts, 5, "{:?}", report.incidents);
+    assert_eq!(relay.state.name(), "dead");
+}
+
+#[test]
+fn wiring_changes_while_the_rest_runs() {
+    let mut plan = chain("wiring");
+    plan.requests = vec![
+        at(205, "unwire source.out relay.from"),
+        at(405, "wire source.out relay.from"),
+        at(605, "remove relay"),
+    ];
+    let report = Simulation::new(&plan, &types(), options(1000)).unwrap().run().unwrap();
+    let numbers: Vec<i64> = heard("wiring").iter().map(|(_, twist)| twist.linear as i64).collect();
+    let expected: Vec<i64> = (1..=21).chain(42..=61).collect();
+    assert_eq!(numbers, expected);
+    assert_eq!(report.view.agents.len(), 2);
+    assert!(report.view.wires.is_empty());
+}
+
+#[test]
+fn a_parameter_and_a_period_change_between_steps() {
+    let mut plan = chain("set");
+    plan.requests = vec![at(95, "set source by 10"), at(195, "set source period 50ms")];
+    Simulation::new(&plan, &types(), options(400)).unwrap().run().unwrap();
+    let heard = heard("set");
+    let numbers: Vec<i64> = heard.iter().map(|(_, twist)| twist.linear as i64).collect();
+    assert_eq!(&numbers[..12], [1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 20, 30]);
+    let times: Vec<i64> = heard.iter().map(|(time, _)| time.0 / 1_000_000).filter(|t| *t >= 190).collect();
+    assert_eq!(times, [190, 240, 290, 340, 390]);
+}
+
+#[test]
+fn what_is_wrong_is_refused_with_the_reason_and_nothing_changes() {
+    let mut plan = chain("refused");
+    plan.requests = vec![
+        at(10, "wire source.out sink.cuont"),
+        at(20, "set source by -1"),
+        at(30, "wire sorce.out sink.count"),
+        at(40, "wire relay.from sink.count"),
+    ];
+    let report = Simulation::new(&plan, &types(), options(100)).unwrap().run().unwrap();
+    let said: Vec<&str> = report.incidents.iter().map(|incident| incident.what.as_str()).collect();
+    assert!(said[0].contains("there is no port of sink \"cuont\"; did you mean \"count\"?"), "{said:?}");
+    assert!(said[1].contains("\"by\" must be at least 0, not -1"), "{said:?}");
+    assert!(said[2].contains("did you mean \"source\"?"), "{said:?}");
+    assert!(said[3].contains("relay.from is an input"), "{said:?}");
+    assert_eq!(report.view.wires.len(), 2);
+}
+
+#[test]
+fn all_mistakes_of_a_plan_are_found_at_once() {
+    let mut plan = chain("mistakes");
+    plan.agent_mut("source").unwrap().kind = "sorce".into();
+    plan.agent_mut("relay").unwrap().on = vec!["frm".into()];
+    plan.agent_mut("sink").unwrap().executor = Some("reflx".into());
+    plan.wires.push(WirePlan::new("relay.to", "sink.counts"));
+    plan.agent_mut("sink").unwrap().params.set("tset", Value::from("x"));
+    let said: Vec<String> = runtime::check(&plan, &types()).iter().map(ToString::to_string).collect();
+    for part in [
+        "did you mean \"source\"?",
+        "did you mean \"from\"?",
+        "did you mean \"reflex\"?",
+        "did you mean \"count\"?",
+        "did you mean \"test\"?",
+    ] {
+        assert!(said.iter().any(|mistake| mistake.contains(part)), "{part} in {said:#?}");
+    }
+}
+
+/// Asks every 100 ms.
+#[derive(Agent)]
+struct Asker {
+    /// Half of a speed.
+    half: Client<Twist, Twist>,
+    /// What was answered; a negative speed for none in time.
+    out: Output<Twist>,
+    n: f64,
+    next: Time,
+}
+
+impl Agent for Asker {
+    fn step(&mut self, step: &mut Step) -> Result<(), Fault> {
+        while let Some((_, reply)) = self.half.reply() {
+            self.out.send(match reply {
+                Reply::Answer(half) => half,
+                Reply::TimeOut => Twist::new(-1.0, 0.0),
+            });
+        }
+        // The answer makes it run again at the same instant.
+        if step.now >= self.next {
+            self.next = step.now + Duration::millis(100);
+            self.n += 2.0;
+            let _ = self.half.call(Twist::new(self.n, 0.0), Duration::millis(30));
+        }
+        Ok(())
+    }
+}
+
+/// Answers.
+#[derive(Agent)]
+struct Answerer {
+    /// Half of a speed.
+    half: Service<Twist, Twist>,
+}
+
+impl Agent for Answerer {
+    fn step(&mut self, _: &mut Step) -> Result<(), Fault> {
+        self.half.serve(|twist| Twist::new(twist.linear / 2.0, 0.0));
+        Ok(())
+    }
+}
+
+#[test]
+fn a_call_is_answered_or_its_time_out_comes_as_a_message() {
+    let mut plan = Plan::new("calls");
+    let asker = plan.add::<Asker>("asker", Default::default());
+    let answerer = plan.add::<Answerer>("answerer", Default::default());
+    let end = plan.add::<Sink>("sink", sink("calls"));
+    plan.wire(&asker.half, &answerer.half);
+    plan.wire(&asker.out, &end.count);
+    plan.every("asker", Duration::millis(100));
+    plan.on("answerer", "half");
+    plan.on("sink", "count");
+    plan.requests = vec![at(150, "fault answerer off")];
+    Simulation::new(&plan, &types(), options(350)).unwrap().run().unwrap();
+    let heard: Vec<(i64, f64)> =
+        heard("calls").iter().map(|(time, twist)| (time.0 / 1_000_000, twist.linear)).collect();
+    // Answers make the client run at once; without one, the time-out does.
+    assert_eq!(heard, [(0, 1.0), (100, 2.0), (230, -1.0), (330, -1.0)]);
+}
+
+/// Sends to itself through another.
+#[derive(Agent)]
+struct Loop {
+    /// What comes.
+    from: Input<Twist>,
+    /// What goes.
+    to: Output<Twist>,
+}
+
+impl Agent for Loop {
+    fn step(&mut self, _: &mut Step) -> Result<(), Fault> {
+        while self.from.take().is_some() {}
+        self.to.send(Twist::ZERO);
+        Ok(())
+    }
+}
+
+#[test]
+fn an_endless_loop_at_one_instant_is_named() {
+    let mut plan = Plan::new("loop");
+    let ping = plan.add::<Loop>("ping", Default::default());
+    let pong = plan.add::<Loop>("pong", Default::default());
+    plan.wire(&ping.to, &pong.from);
+    plan.wire(&pong.to, &ping.from);
+    plan.every("ping", Duration::secs(1));
+    plan.on("ping", "from");
+    plan.on("pong", "from");
+    let error = Simulation::new(&plan, &types(), options(2000)).unwrap().run().unwrap_err().to_string();
+    assert!(error.contains("ping") && error.contains("pong"), "{error}");
+}
+
+/// Paints a picture.
+#[derive(Agent)]
+struct Painter {
+    /// The picture.
+    #[port(rows = 64, history = 4)]
+    picture: Output<Image>,
+    n: u8,
+}
+
+impl Agent for Painter {
+    fn step(&mut self, _: &mut Step) -> Result<(), Fault> {
+        self.n += 1;
+        let n = self.n;
+        self.picture.send_with(|image, pixels| {
+            (image.width, image.height) = (4, 4);
+            pixels[..48].fill(n);
+            48
+        });
+        Ok(())
+    }
+}
+
+/// Looks at pictures.
+#[derive(Agent)]
+struct Viewer {
+    /// The picture.
+    picture: Input<Image>,
+    /// What was seen, as a speed.
+    out: Output<Twist>,
+}
+
+impl Agent for Viewer {
+    fn step(&mut self, _: &mut Step) -> Result<(), Fault> {
+        while let Some(picture) = self.picture.take() {
+            assert_eq!(picture.row().len(), 48);
+            let seen = Twist::new(f64::from(picture.row()[47]), f64::from(picture.width));
+            drop(picture);
+            self.out.send(seen);
+        }
+        Ok(())
+    }
+}
+
+#[test]
+fn a_picture_travels_by_link() {
+    let mut plan = Plan::new("pictures");
+    let painter = plan.add::<Painter>("painter", Default::default());
+    let viewer = plan.add::<Viewer>("viewer", Default::default());
+    let end = plan.add::<Sink>("sink", sink("pictures"));
+    plan.wire(&painter.picture, &viewer.picture);
+    plan.wire(&viewer.out, &end.count);
+    plan.every("painter", Duration::millis(10));
+    plan.on("viewer", "picture");
+    plan.on("sink", "count");
+    Simulation::new(&plan, &types(), options(100)).unwrap().run().unwrap();
+    let seen: Vec<f64> = heard("pictures").iter().map(|(_, twist)| twist.linear).collect();
+    assert_eq!(seen, (1..=11).map(f64::from).collect::<Vec<_>>());
+}
+
+#[derive(Default)]
+struct Written(Arc<Mutex<Vec<u8>>>);
+
+impl runtime::Recorder for Written {
+    fn message(
+        &mut self,
+        topic: &str,
+        _: &dyn Fn() -> types::definition::Definition,
+        header: &types::Header,
+        cdr: &[u8],
+    ) {
+        let mut bytes = self.0.lock().unwrap();
+        bytes.extend_from_slice(topic.as_bytes());
+        bytes.extend_from_slice(format!("{header:?}").as_bytes());
+        bytes.extend_from_slice(cdr);
+    }
+    fn note(&mut self, time: Time, who: &str, text: &str) {
+        self.0.lock().unwrap().extend_from_slice(format!("{time}{who}{text}").as_bytes());
+    }
+    fn finish(&mut self) {}
+}
+
+#[test]
+fn two_runs_write_the_same_bytes() {
+    let run = || {
+        let mut plan = chain("bytes");
+        plan.requests = vec![
+            at(200, "fault relay panic"),
+            at(300, "fault source.out intermittent"),
+            at(500, "fault source.out wrong"),
+        ];
+        let bytes = Arc::<Mutex<Vec<u8>>>::default();
+        let log = runtime::LogChoice::by(|_, _| 1);
+        let options = Options { recorder: Some(Box::new(Written(bytes.clone()))), log, ..options(1000) };
+        Simulation::new(&plan, &types(), options).unwrap().run().unwrap();
+        let bytes = bytes.lock().unwrap().clone();
+        bytes
+    };
+    let (a, b) = (run(), run());
+    assert!(a.len() > 10_000);
+    assert!(a == b, "the bytes differ");
+}
+
+#[test]
+fn ports_are_known_by_their_shape() {
+    let types = types();
+    let asker = types.get("asker").unwrap();
+    let directions: Vec<Direction> = asker.ports.iter().map(|port| port.shape.direction).collect();
+    assert_eq!(directions, [Direction::Client, Direction::Output]);
+    assert_eq!(types.get("source").unwrap().params[0].doc, "By how much.");
+}
