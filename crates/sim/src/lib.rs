@@ -1,0 +1,45 @@
+//! The world in the plane, pure and seeded: bodies, contacts, sensors with noise, a camera, people, goals and draws.
+//!
+//! | to find | look in |
+//! |---|---|
+//! | what a world file says | [`plan`] |
+//! | what a robot is made of | [`model`] |
+//! | the running world | [`simulator`], with `robot` (motion, contacts) and `people` (scripts) |
+//! | sensors | `sonar`, [`laser`], [`camera`]; all are methods of [`Simulator`] |
+//! | what makes a run a success | [`goal`] |
+//! | what a seed changes | [`vary`], with [`free_way`] |
+//! | plain data to draw | [`snapshot`] |
+//! | rays, grid and chance underneath | [`shape`], `field`, [`chance`] |
+//!
+//! There is no clock, file, thread or generator here. The same plan, seed and commands give the same bytes.
+#![forbid(unsafe_code)]
+
+pub mod camera;
+pub mod chance;
+pub mod colour;
+mod field;
+pub mod free_way;
+pub mod goal;
+pub mod laser;
+pub mod model;
+mod outline;
+mod people;
+pub mod plan;
+mod read;
+mod robot;
+pub mod shape;
+pub mod simulator;
+pub mod snapshot;
+mod sonar;
+pub mod vary;
+
+pub use chance::Stream;
+pub use colour::Colour;
+pub use goal::{Goal, Progress};
+pub use model::Model;
+pub use people::POLITE;
+pub use plan::WorldPlan;
+pub use read::read_pose;
+pub use robot::{CLEARANCE_LIMIT, Charge, HeadState, Truth};
+pub use simulator::{AddError, PHYSICS_STEP, RobotId, Simulator};
+pub use vary::{Drawn, Vary};

@@ -1,0 +1,149 @@
+//! People: they stand, walk their way-points, appear when a robot comes, and lead it.
+
+use types::geometry::Pose;
+use types::{Duration, Point, Time};
+
+use crate::field::Field;
+use crate::plan::{Person, Region, WorldPlan};
+use crate::robot::{Robot, STEP};
+
+/// People keep this far from a robot (m, surface to surface): they never walk into one.
+pub const POLITE: f64 = 0.15;
+
+/// A person in the world.
+#[derive(Clone, Debug)]
+pub(crate) struct Walker {
+    pub plan: Person,
+    pub body: u32,
+    pub at: Point,
+    pub facing: f64,
+    pub present: bool,
+    /// Whether the person walked in the last step.
+    pub walking: bool,
+    appears: Option<Region>,
+    whens: Vec<Option<Region>>,
+    leg: usize,
+    /// When the present leg begins; not yet known while its trigger has not come.
+    begins: Option<Time>,
+}
+
+impl Walker {
+    pub(crate) fn new(plan: &Person, body: u32, world: &WorldPlan) -> Walker {
+        let region = |name: &Option<String>| name.as_deref().and_then(|name| world.region(name)).cloned();
+        Walker {
+            body,
+            at: plan.at,
+            facing: plan.facing,
+            present: plan.appears.is_none(),
+            walking: false,
+            appears: region(&plan.appears),
+            whens: plan.walk.iter().map(|leg| region(&leg.when)).collect(),
+            leg: 0,
+            begins: None,
+            plan: plan.clone(),
+        }
+    }
+
+    /// Whether the person can ever do anything but stand.
+    pub(crate) fn acts(&self) -> bool {
+        !self.present || !self.plan.walk.is_empty() || self.plan.gap.is_some()
+    }
+
+    /// Where the middle of a carried thing is (m).
+    pub(crate) fn hands(&self) -> Option<Point> {
+        let thing = self.plan.carries.as_ref()?;
+        Some(self.at + Point::polar(self.plan.radius + thing.radius + 0.05, self.facing))
+    }
+
+    /// One step; gives how far the person moved (m), infinity when somebody appeared.
+    pub(crate) fn step(&mut self, now: Time, robots: &[Robot], field: &mut Field) -> f64 {
+        self.walking = false;
+        let near = nearest(robots, self.at);
+        if self.plan.gap.is_some()
+            && let Some((_, pose)) = near
+        {
+            self.facing = (pose.position() - self.at).bearing();
+        }
+        if !self.present {
+            return self.appear(robots, field);
+        }
+        if !self.ready(now, robots) {
+            return 0.0;
+        }
+        if let Some(gap) = self.plan.gap
+            && near.is_none_or(|(distance, _)| distance >= gap)
+        {
+            return 0.0;
+        }
+        self.walk(robots, field)
+    }
+
+    fn appear(&mut self, robots: &[Robot], field: &mut Field) -> f64 {
+        let called = self.appears.as_ref().is_none_or(|region| someone_in(robots, region));
+        if !called || !self.free(self.at, robots) {
+            return 0.0;
+        }
+        self.present = true;
+        field.bodies[self.body as usize].present = true;
+        f64::INFINITY
+    }
+
+    /// Whether the present leg has begun.
+    fn ready(&mut self, now: Time, robots: &[Robot]) -> bool {
+        let Some(leg) = self.plan.walk.get(self.leg) else { return false };
+        if self.begins.is_none() {
+            let called = self.whens[self.leg].as_ref().is_none_or(|region| someone_in(robots, region));
+            self.begins = called.then(|| now.saturating_add(leg.wait.max(Duration::ZERO)));
+        }
+        self.begins.is_some_and(|begins| now >= begins)
+    }
+
+    fn walk(&mut self, robots: &[Robot], field: &mut Field) -> f64 {
+        let to = self.plan.walk[self.leg].to;
+        let way = to - self.at;
+        let (left, most) = (way.norm(), self.plan.speed * STEP);
+        let next = if left <= most { to } else { self.at + way * (most / left) };
+        if !self.free(next, robots) {
+            return 0.0;
+        }
+        if left <= most {
+            self.begins = None;
+            self.leg += 1;
+            if self.plan.repeat && self.leg == self.plan.walk.len() {
+                self.leg = 0;
+            }
+        }
+        if self.plan.gap.is_none() && left > 0.0 {
+            self.facing = way.bearing();
+        }
+        self.walking = true;
+        self.at = next;
+        field.place_body(self.body, next);
+        left.min(most)
+    }
+
+    /// Whether no robot would be too near at `next`, or the step at least leads away from it.
+    fn free(&self, next: Point, robots: &[Robot]) -> bool {
+        robots.iter().all(|robot| {
+            let centre = robot.truth.pose.position();
+            let keep = self.plan.radius + robot.model.radius + POLITE;
+            let distance = next.distance(centre);
+            distance >= keep || (self.present && distance > self.at.distance(centre))
+        })
+    }
+}
+
+fn someone_in(robots: &[Robot], region: &Region) -> bool {
+    robots.iter().any(|robot| region.contains(robot.truth.pose.position()))
+}
+
+fn nearest(robots: &[Robot], at: Point) -> Option<(f64, Pose)> {
+    let mut best: Option<(f64, Pose)> = None;
+    for robot in robots {
+        let distance = robot.truth.pose.position().distance(at);
+        if best.is_none_or(|(least, _)| distance < least) {
+            best = Some((distance, robot.truth.pose));
+        }
+    }
+    best
+}
