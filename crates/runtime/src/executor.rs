@@ -21,6 +21,7 @@ use crate::door::{CHANGES, Door};
 use crate::os;
 use crate::port::{InputEnd, OutputEnd, PortEnds, WireId};
 use crate::stats::{AgentStats, bump, nanos};
+use crate::witness::Witness;
 
 /// When an agent runs.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -29,6 +30,8 @@ pub(crate) struct Timing {
     pub period: Duration,
     pub deadline: Duration,
     pub min_gap: Duration,
+    /// How long a step may last before it is taken for one that does not return.
+    pub hang_after: Duration,
 }
 
 /// An agent's place in an executor.
@@ -181,6 +184,8 @@ pub(crate) struct Running {
     pub agent: AtomicU32,
     /// When the step began, in [`os::ticks`].
     pub since: AtomicU64,
+    /// After how long it is taken for one that does not return (ns).
+    pub limit: AtomicU64,
     /// Counts steps, so that two of the same agent are told apart.
     pub steps: AtomicU64,
 }
@@ -370,8 +375,8 @@ impl Core {
         self.releases.push(Reverse((time, slot)));
     }
 
-    /// Runs one step. `now` is the time that the agent sees. `measure` gives the time at its end for one that began `now`,
-    /// from the nanoseconds that it took; a simulated clock says that it took none.
+    /// Runs one step. `now` is the time that the agent sees. On the wall clock, where there is a witness, time goes on while it
+    /// runs; in simulated time it takes none.
     ///
     /// # Safety
     /// `core` is valid and owned by the calling thread. `still_mine` says after the step whether that is so: if not, the core
@@ -381,7 +386,7 @@ impl Core {
         context: &Context,
         job: Job,
         now: Time,
-        elapses: bool,
+        witness: Option<&Witness>,
         still_mine: impl FnOnce() -> bool,
     ) -> Option<Ended> {
         // SAFETY: the caller owns the core; this borrow ends before the step.
@@ -403,16 +408,18 @@ impl Core {
                 StepFault::Slow => {}
                 StepFault::Hang => {
                     seat.fault = StepFault::None;
+                    core.running.limit.store(seat.timing.hang_after.0 as u64, Ordering::Relaxed);
                     return Some(Ended::AskedToHang(job.slot));
                 }
             }
             let Some(body) = seat.body.take() else { return Some(Ended::NotRun) };
             seat.last_step = now;
             seat.stats.jitter.add(nanos(now - job.release));
-            let seat_id = seat.id;
+            let (seat_id, seat_limit) = (seat.id, seat.timing.hang_after);
             let step = Step { now, deadline: job.deadline, agent: seat.id, period: seat.timing.period };
             context.begin(seat.id, now, core.number, &*core.ready);
             let begun = os::ticks();
+            core.running.limit.store(seat_limit.0 as u64, Ordering::Relaxed);
             core.running.since.store(begun, Ordering::Relaxed);
             core.running.steps.store(core.running.steps.load(Ordering::Relaxed) + 1, Ordering::Relaxed);
             core.running.agent.store(seat_id.0, Ordering::Relaxed);
@@ -450,7 +457,7 @@ impl Core {
         let core = unsafe { &mut *core };
         core.running.slot.store(0, Ordering::Relaxed);
         let alarm = context.end();
-        core.end(context, job, now, result, body, alarm, taken, (begun, ended), elapses);
+        core.end(context, job, now, result, body, alarm, taken, (begun, ended), witness);
         Some(Ended::Normally)
     }
 
@@ -465,15 +472,18 @@ impl Core {
         alarm: Time,
         taken: u64,
         (begun, ended): (u64, u64),
-        elapses: bool,
+        witness: Option<&Witness>,
     ) {
         let took = (ended.saturating_sub(begun) as f64 * self.nanos_per_tick) as u64;
         let Some(seat) = self.seats.get_mut(job.slot as usize).and_then(Option::as_mut) else { return };
         seat.stats.exec.add(took);
-        let end = if elapses { now + Duration(took as i64) } else { now };
+        let end = if witness.is_some() { now + Duration(took as i64) } else { now };
         seat.stats.response.add(nanos(end - job.release));
         if end > job.deadline {
             bump(&seat.stats.missed);
+            if witness.is_some_and(|witness| witness.saw_stall(job.release, end)) {
+                bump(&seat.stats.stalled);
+            }
         }
         let cause = match result {
             Ok(Ok(())) => None,

@@ -72,6 +72,8 @@ mod sync;
 mod system;
 mod tap;
 mod trace;
+mod wall;
+mod witness;
 
 pub use agent::{
     Agent, AgentType, ClientEnd, Declare, Fault, InputEnd, NoParams, OutputEnd, PortInfo, Registry,
@@ -101,3 +103,4 @@ pub use stats::{AgentStats, Figure, Histogram};
 pub use system::{CannotRun, Control, NoObserver, Observer, Options, Report, Verdict};
 pub use tap::{Heard, Tap};
 pub use types::params::Params;
+pub use wall::Live;

@@ -41,6 +41,8 @@ const LEAST_HANG: Duration = Duration::millis(50);
 pub(crate) trait Fabric {
     /// Makes the executor serve what was given to it, or gives it time to. Says whether to go on waiting.
     fn pump(&mut self, executor: usize) -> bool;
+    /// The executor has answered.
+    fn answered(&mut self) {}
 }
 
 struct Known {
@@ -886,8 +888,12 @@ impl Router {
             let go_on = fabric.pump(executor);
             while let Ok(answer) = self.executors[executor].link.answers.pop() {
                 match answer {
-                    Answer::Done(change) => return Ok(change),
+                    Answer::Done(change) => {
+                        fabric.answered();
+                        return Ok(change);
+                    }
                     Answer::NotDrained(change) => {
+                        fabric.answered();
                         drop(change);
                         return Err(Refusal::new("not drained yet"));
                     }
@@ -909,8 +915,12 @@ impl Router {
         }
         for (executor, answer) in core::mem::take(&mut self.died) {
             if let Answer::Died { slot, id, time, cause, body } = answer {
+                let hung = matches!(cause, RawCause::Hang);
                 self.bury(executor, slot, id, time, cause);
                 drop(body);
+                if hung {
+                    self.renew(id, fabric);
+                }
             }
         }
         let mut next = Time::NEVER;
@@ -949,6 +959,61 @@ impl Router {
             }
         }
         next
+    }
+
+    /// Gives an agent whose step did not return new ports and a new number. Its old ones may still be in use by the step: they
+    /// are left to it, nobody listens to them any more, and nobody sends to them.
+    fn renew(&mut self, id: AgentId, fabric: &mut dyn Fabric) {
+        let Some(at) = self.agents.iter().position(|known| known.id == id) else { return };
+        let touched = |wire: &Wire| wire.from.0 == id || wire.to.0 == id;
+        let plans: Vec<WirePlan> = self
+            .wires
+            .iter()
+            .filter(|wire| touched(wire) && !wire.is_answer)
+            .map(|wire| self.plan_of(wire))
+            .collect();
+        let old: Vec<(WireId, (AgentId, usize), (AgentId, usize))> = self
+            .wires
+            .iter()
+            .filter(|wire| touched(wire))
+            .map(|wire| (wire.id, wire.from, wire.to))
+            .collect();
+        for (wire, from, to) in old {
+            let side = |id: AgentId, port: usize| {
+                self.by_id(id).map(|known| (known.executor, known.ends[port].clone()))
+            };
+            // What an executor does not answer to now, it does later: the change waits in its ring.
+            if from.0 != id
+                && let Some((executor, PortEnds { output: Some(end), .. })) = side(from.0, from.1)
+            {
+                let into = end.forgetting_box();
+                let _ = self.commit(executor, Change::Forget { end, wire, into }, fabric);
+            } else if to.0 != id
+                && let Some((executor, PortEnds { input: Some(end), .. })) = side(to.0, to.1)
+            {
+                let _ = self.leave(executor, end, wire, true, fabric);
+            }
+        }
+        self.wires.retain(|wire| wire.from.0 != id && wire.to.0 != id);
+        let known = self.agents.remove(at);
+        let _ = self.commit(known.executor, Change::Unseat { slot: known.slot, seat: None }, fabric);
+        self.executors[known.executor].slots[known.slot as usize] = false;
+        if self.add(known.plan, &[], fabric).is_err() {
+            return;
+        }
+        for plan in plans {
+            let _ = self.wire(&plan, fabric);
+        }
+        if let Some(new) = self.agents.last_mut() {
+            (new.deaths, new.last_death, new.restart_at) = (known.deaths, known.last_death, known.restart_at);
+            new.state = known.state;
+            let hangs = known.stats.hangs.load(Relaxed);
+            new.stats.hangs.store(hangs, Relaxed);
+            new.stats.restarts.store(known.stats.restarts.load(Relaxed), Relaxed);
+            let (executor, slot) = (new.executor, new.slot);
+            // It waits for its restart like everybody who died.
+            let _ = self.commit(executor, Change::Body { slot, body: None }, fabric);
+        }
     }
 
     fn bury(&mut self, executor: usize, slot: u32, id: AgentId, time: Time, cause: RawCause) {
@@ -1086,6 +1151,11 @@ impl Router {
 }
 
 impl ExecutorKnown {
+    /// Whether any agent is on it.
+    pub(crate) fn is_used(&self) -> bool {
+        self.slots.iter().any(|taken| *taken)
+    }
+
     pub(crate) fn new(plan: ExecutorPlan, link: Link) -> ExecutorKnown {
         ExecutorKnown { plan, link, granted: "simulated".into(), slots: Vec::new() }
     }
@@ -1138,5 +1208,6 @@ pub(crate) fn timing_of(plan: &AgentPlan) -> Result<Timing, Refusal> {
             "the deadline of {name} must lie between zero and its period ({usual}), not {deadline}"
         )));
     }
-    Ok(Timing { period, deadline, min_gap: plan.min_gap })
+    let hang_after = plan.hang_after.unwrap_or((deadline * 4).max(LEAST_HANG));
+    Ok(Timing { period, deadline, min_gap: plan.min_gap, hang_after })
 }

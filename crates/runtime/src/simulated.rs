@@ -116,7 +116,7 @@ fn play(simulation: Simulation) -> Result<Report, CannotRun> {
     // The run's own end of the way to ask would keep it from ever being closed.
     drop(control);
     let Built { router, cores, directory } = built;
-    let (writer, reader) = trace::ring(true);
+    let (writer, reader) = trace::ring(trace::LARGE, true);
     let Options { limit, speed, recorder, mut observer, .. } = options;
     let log_shared = router.log_shared.clone();
     let log = LogThread::start(log_shared, vec![reader], recorder, directory.clone())?;
@@ -207,7 +207,7 @@ impl Player {
                 core.look_at_door(&self.context, self.now);
                 if let Some(job) = core.next(self.now) {
                     // SAFETY: the core lives in this thread's own array, and nobody else takes it.
-                    let ended = unsafe { Core::run(core, &self.context, job, self.now, false, || true) };
+                    let ended = unsafe { Core::run(core, &self.context, job, self.now, None, || true) };
                     if let Some(Ended::AskedToHang(slot)) = ended {
                         self.hang(at, slot);
                     }
@@ -254,7 +254,7 @@ impl Player {
                     }
                 }
                 // SAFETY: as in `instant`.
-                unsafe { Core::run(core, &self.context, job, self.now, false, || true) };
+                unsafe { Core::run(core, &self.context, job, self.now, None, || true) };
                 break;
             }
         }

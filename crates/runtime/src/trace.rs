@@ -11,8 +11,10 @@ use std::sync::Arc;
 
 use types::{AgentId, Header, Time};
 
-/// Words of a ring: 4 MiB, room for some twenty pictures.
-const WORDS: usize = 1 << 19;
+/// Words of the ring of a simulation, whose one thread writes everything: 4 MiB, some twenty pictures.
+pub(crate) const LARGE: usize = 1 << 19;
+/// Words of the ring of one thread of many: 1 MiB.
+pub(crate) const SMALL: usize = 1 << 17;
 
 const WORD: usize = size_of::<u64>();
 /// The kind of a record stands in the upper half of its first word, its length in words in the lower.
@@ -49,9 +51,9 @@ pub struct Reader {
     shared: Arc<Shared>,
 }
 
-/// Makes a ring. A writer that `waits` never drops.
-pub(crate) fn ring(waits: bool) -> (Writer, Reader) {
-    let words = (0..WORDS).map(|_| UnsafeCell::new(0)).collect();
+/// Makes a ring of so many words. A writer that `waits` never drops.
+pub(crate) fn ring(words: usize, waits: bool) -> (Writer, Reader) {
+    let words = (0..words).map(|_| UnsafeCell::new(0)).collect();
     let shared = Arc::new(Shared {
         words,
         written: AtomicU64::new(0),
@@ -106,14 +108,15 @@ const HEADER_WORDS: usize = size_of::<Header>().div_ceil(WORD);
 impl Writer {
     /// Finds room for a record of `len` words that lie together. Nothing when there is none and the writer does not wait.
     fn room(&mut self, len: usize) -> Option<usize> {
-        if len >= WORDS / 2 {
+        let words = self.shared.words.len();
+        if len >= words / 2 {
             self.shared.dropped.fetch_add(1, Ordering::Relaxed);
             return None;
         }
-        let at = self.written as usize % WORDS;
-        let skipped = if at + len > WORDS { WORDS - at } else { 0 };
+        let at = self.written as usize % words;
+        let skipped = if at + len > words { words - at } else { 0 };
         // Pairs with the release in `Reader::drain`.
-        while self.written + (skipped + len) as u64 - self.shared.read.load(Ordering::Acquire) > WORDS as u64
+        while self.written + (skipped + len) as u64 - self.shared.read.load(Ordering::Acquire) > words as u64
         {
             if !self.waits || self.shared.closed.load(Ordering::Relaxed) {
                 self.shared.dropped.fetch_add(1, Ordering::Relaxed);
@@ -125,7 +128,7 @@ impl Writer {
             self.put(at, SKIP | skipped as u64);
             self.written += skipped as u64;
         }
-        Some(self.written as usize % WORDS)
+        Some(self.written as usize % words)
     }
 
     #[inline]
@@ -138,7 +141,7 @@ impl Writer {
     /// `bytes` bytes can be read at `from`, and `room` gave as many words at `at`.
     #[inline]
     unsafe fn copy(&self, at: usize, from: *const u8, bytes: usize) {
-        debug_assert!(at + words_for(bytes) <= WORDS);
+        debug_assert!(at + words_for(bytes) <= self.shared.words.len());
         // SAFETY: the caller's promise; the words lie together.
         unsafe { core::ptr::copy_nonoverlapping(from, self.shared.words[at].get().cast::<u8>(), bytes) };
     }
@@ -204,7 +207,7 @@ impl Reader {
         let written = self.shared.written.load(Ordering::Acquire);
         let mut records = 0;
         while read < written {
-            let at = read as usize % WORDS;
+            let at = read as usize % self.shared.words.len();
             let first = self.word(at);
             let len = (first & 0xffff_ffff) as usize;
             if first >> 32 != SKIP >> 32 {
@@ -285,7 +288,7 @@ mod tests {
 
     #[test]
     fn what_is_written_is_read_in_order_past_the_wrap() {
-        let (mut writer, mut reader) = ring(false);
+        let (mut writer, mut reader) = ring(LARGE, false);
         let row = [7u8; 100_001];
         let mut seen = 0u64;
         for i in 0..200u64 {
@@ -310,7 +313,7 @@ mod tests {
 
     #[test]
     fn a_full_ring_drops_and_counts() {
-        let (mut writer, mut reader) = ring(false);
+        let (mut writer, mut reader) = ring(LARGE, false);
         for _ in 0..100 {
             writer.message(0, &Header::default(), &Twist::ZERO, &[0u8; 100_000]);
         }

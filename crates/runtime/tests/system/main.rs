@@ -1,4 +1,6 @@
-//! Whole systems in simulated time.
+//! Whole systems, in simulated time and on the wall clock.
+
+mod wall;
 
 use runtime::{
     Agent, Client, Direction, Fault, FaultKind, Input, Options, Output, Params, Plan, Refusal, Registry,

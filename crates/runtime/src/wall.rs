@@ -1,0 +1,641 @@
+//! The wall clock: each executor is a thread of its own.
+//!
+//! The control side is the thread that called [`Live::run`]: it answers requests, starts the dead again and looks at the run.
+//! Beside it stand a watchdog, which sees steps that do not return, and a witness for each processor, which sees stalls that
+//! nobody in the process caused.
+
+#![allow(unsafe_code)]
+
+use core::sync::atomic::{AtomicBool, AtomicI32, AtomicU32, Ordering};
+use std::cell::UnsafeCell;
+use std::sync::mpsc::{Receiver, RecvTimeoutError};
+use std::sync::{Arc, Mutex, PoisonError};
+use std::time::Duration as HostDuration;
+
+use types::{Duration, Time};
+
+use crate::agent::Registry;
+use crate::context::{Context, install_panic_hook};
+use crate::door::{CHANGES, Door};
+use crate::executor::{Core, Ended, Running};
+use crate::log::LogThread;
+use crate::names::Directory;
+use crate::os;
+use crate::plan::{ExecutorPlan, Plan};
+use crate::request::{Refusal, Request};
+use crate::router::{Fabric, Incident, Router};
+use crate::system::{Ask, Built, CannotRun, Control, Options, Report, Verdict, asks, build};
+use crate::trace;
+use crate::witness::Witness;
+
+/// The witness stands above everything, the watchdog next to it.
+const WITNESS_PRIORITY: u8 = 95;
+const WATCHDOG_PRIORITY: u8 = 94;
+/// How often the watchdog looks.
+const WATCHDOG_PERIOD: Duration = Duration::millis(5);
+/// How often the control side looks without being asked.
+const CONTROL_PERIOD: HostDuration = HostDuration::from_millis(10);
+/// More steps than this that never returned, and the system stops.
+const MOST_HUNG: usize = 4;
+/// How long the control side waits for an executor to answer.
+const PATIENCE: Duration = Duration::secs(2);
+
+/// The time of the wall: the monotonic clock, counted from the Unix epoch.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct WallClock {
+    offset: i64,
+}
+
+impl WallClock {
+    fn start() -> WallClock {
+        WallClock { offset: os::realtime() - os::monotonic() }
+    }
+
+    fn now(self) -> Time {
+        Time(os::monotonic() + self.offset)
+    }
+
+    fn monotonic(self, time: Time) -> Option<i64> {
+        (time != Time::NEVER).then(|| time.0 - self.offset)
+    }
+}
+
+const NOBODY: u32 = 0;
+
+/// An executor's core and whose it is. A thread touches the core while `owner` is its own number.
+struct Cell {
+    core: UnsafeCell<Core>,
+    /// The number of the thread that owns the core.
+    owner: AtomicU32,
+    /// Decides between the watchdog and a thread that came back at the last moment: zero, or the number of the winner.
+    claim: AtomicU32,
+    /// The kernel's number of the owner's thread.
+    thread: AtomicI32,
+    /// The slot that was given up, for the thread that takes over; plus one.
+    given_up: AtomicU32,
+    running: Arc<Running>,
+    door: Arc<Door>,
+    /// Where the spare thread waits for its number.
+    call: AtomicU32,
+    granted: Mutex<Option<String>>,
+    stop: AtomicBool,
+}
+
+// SAFETY: the core is touched only by the thread whose number `owner` holds; it changes only as `take_over` says.
+unsafe impl Sync for Cell {}
+// SAFETY: everything in it can be sent; the core is only ever used by one thread at a time.
+unsafe impl Send for Cell {}
+
+/// A system on the wall clock, ready to run.
+pub struct Live {
+    built: Built,
+    control: Control,
+    asks: Receiver<Ask>,
+    options: Options,
+    timed: Vec<(Duration, Request, String)>,
+    clock: WallClock,
+}
+
+impl Live {
+    /// Builds what a plan describes.
+    pub fn new(plan: &Plan, registry: &Registry, options: Options) -> Result<Live, CannotRun> {
+        install_panic_hook();
+        let clock = WallClock::start();
+        let built = build(plan, registry, options.log.clone(), clock.now())?;
+        let (control, asks) = asks();
+        let mut timed = Vec::new();
+        for request in &plan.requests {
+            let parsed = (options.parse)(&request.words).map_err(CannotRun::Refused)?;
+            timed.push((request.at, parsed, request.words.join(" ")));
+        }
+        timed.sort_by_key(|(at, _, _)| *at);
+        Ok(Live { built, control, asks, options, timed, clock })
+    }
+
+    /// A way to ask the system while it runs, from another thread.
+    pub fn control(&self) -> Control {
+        self.control.clone()
+    }
+
+    /// Runs to the end. The calling thread becomes the control side.
+    pub fn run(self) -> Result<Report, CannotRun> {
+        Runner::start(self)?.run()
+    }
+}
+
+struct Runner {
+    router: Router,
+    cells: Vec<Arc<Cell>>,
+    threads: Vec<std::thread::JoinHandle<()>>,
+    /// The watchdog and the witnesses.
+    guards: Vec<std::thread::JoinHandle<()>>,
+    over: Arc<AtomicBool>,
+    hung: Arc<AtomicU32>,
+    spare_readers: SpareLogs,
+    log: LogThread,
+    asks: Receiver<Ask>,
+    options: Options,
+    timed: std::iter::Peekable<std::vec::IntoIter<(Duration, Request, String)>>,
+    clock: WallClock,
+    begun: Time,
+    incidents_seen: usize,
+    directory: Arc<Directory>,
+    next_thread: u32,
+    witness: Arc<Witness>,
+}
+
+/// Ends of log rings that were made ahead for spare threads.
+type SpareLogs = Vec<trace::Writer>;
+
+/// How many spare threads can be made while the system runs.
+const SPARE_LOGS: usize = MOST_HUNG + 1;
+
+impl Runner {
+    fn start(live: Live) -> Result<Runner, CannotRun> {
+        let Live { built, control, asks, mut options, timed, clock } = live;
+        drop(control);
+        let Built { router, cores, directory } = built;
+        os::register_barrier();
+        let wants_real_time =
+            router.executors.iter().any(|executor| executor.plan.priority.is_some() && executor.is_used());
+        if wants_real_time && let Err(error) = os::lock_memory() {
+            let what = format!("memory is not locked: {error}; page faults can make steps late");
+            router.log_shared.note(clock.now(), "sinew", &what);
+        }
+        let mut writers = Vec::new();
+        let mut readers = Vec::new();
+        for _ in 0..cores.len() * 2 + SPARE_LOGS {
+            let (writer, reader) = trace::ring(trace::SMALL, false);
+            writers.push(writer);
+            readers.push(reader);
+        }
+        let log =
+            LogThread::start(router.log_shared.clone(), readers, options.recorder.take(), directory.clone())?;
+        let witness = Arc::new(Witness::new());
+        let mut runner = Runner {
+            cells: Vec::new(),
+            threads: Vec::new(),
+            guards: Vec::new(),
+            over: Arc::default(),
+            hung: Arc::default(),
+            spare_readers: writers,
+            log,
+            asks,
+            options,
+            timed: timed.into_iter().peekable(),
+            clock,
+            begun: clock.now(),
+            incidents_seen: 0,
+            directory,
+            next_thread: NOBODY,
+            router,
+            witness,
+        };
+        for core in cores {
+            runner.start_executor(core)?;
+        }
+        if wants_real_time {
+            runner.start_guards()?;
+        }
+        Ok(runner)
+    }
+
+    fn start_executor(&mut self, core: Core) -> Result<(), CannotRun> {
+        let at = self.cells.len();
+        if !self.router.executors[at].is_used() {
+            // Nobody is on it yet: its thread is made, but asks for no priority until somebody comes.
+            self.router.executors[at].granted = "idle".into();
+        }
+        let cell = Arc::new(Cell {
+            owner: AtomicU32::new(NOBODY),
+            claim: AtomicU32::new(0),
+            thread: AtomicI32::new(0),
+            given_up: AtomicU32::new(0),
+            running: core.running.clone(),
+            door: core.door.clone(),
+            call: AtomicU32::new(NOBODY),
+            granted: Mutex::new(None),
+            stop: AtomicBool::new(false),
+            core: UnsafeCell::new(core),
+        });
+        self.cells.push(cell.clone());
+        self.next_thread += 1;
+        cell.owner.store(self.next_thread, Ordering::Release);
+        self.spawn(at, self.next_thread)?;
+        self.spawn_spare(at)
+    }
+
+    /// A thread that waits until an executor is handed to it.
+    fn spawn_spare(&mut self, at: usize) -> Result<(), CannotRun> {
+        self.next_thread += 1;
+        self.spawn(at, self.next_thread)
+    }
+
+    fn spawn(&mut self, at: usize, number: u32) -> Result<(), CannotRun> {
+        let cell = self.cells[at].clone();
+        let plan = self.router.executors[at].plan.clone();
+        let (clock, directory, witness) = (self.clock, self.directory.clone(), self.witness.clone());
+        let log = self.spare_readers.pop();
+        let thread = std::thread::Builder::new()
+            .name(format!("sinew-{}", plan.name))
+            .spawn(move || thread_main(&cell, number, &plan, clock, log, directory, &witness))
+            .map_err(|error| CannotRun::NoThread(error.to_string()))?;
+        self.threads.push(thread);
+        Ok(())
+    }
+
+    fn start_guards(&mut self) -> Result<(), CannotRun> {
+        let (cells, over, hung) = (self.cells.clone(), self.over.clone(), self.hung.clone());
+        let next = Arc::new(AtomicU32::new(self.next_thread + 1_000_000));
+        let watchdog = std::thread::Builder::new()
+            .name("sinew-watchdog".into())
+            .spawn(move || watch(&cells, &over, &hung, &next))
+            .map_err(|error| CannotRun::NoThread(error.to_string()))?;
+        self.guards.push(watchdog);
+        for cpu in 0..std::thread::available_parallelism().map_or(1, usize::from) {
+            let (witness, over, offset) = (self.witness.clone(), self.over.clone(), self.clock.offset);
+            let thread = std::thread::Builder::new()
+                .name(format!("sinew-witness{cpu}"))
+                .spawn(move || {
+                    // A witness without priority would see its own process; it then does not run.
+                    if os::set_affinity(&[cpu]).is_ok() && os::set_fifo(WITNESS_PRIORITY).is_ok() {
+                        os::exact_timers();
+                        witness.watch(cpu, &over, offset);
+                    }
+                })
+                .map_err(|error| CannotRun::NoThread(error.to_string()))?;
+            self.guards.push(thread);
+        }
+        Ok(())
+    }
+
+    fn run(mut self) -> Result<Report, CannotRun> {
+        let host = os::monotonic();
+        let mut next_look = self.begun;
+        let ended = loop {
+            if let Some(reason) = self.look(&mut next_look)? {
+                break reason;
+            }
+            match self.asks.recv_timeout(CONTROL_PERIOD) {
+                Ok(ask) => {
+                    if let Some(reason) = self.answer(ask) {
+                        break reason;
+                    }
+                }
+                Err(RecvTimeoutError::Timeout) => {}
+                Err(RecvTimeoutError::Disconnected) => std::thread::park_timeout(CONTROL_PERIOD),
+            }
+        };
+        let now = self.clock.now();
+        let view = self.router.view(now);
+        self.end();
+        let log_dropped = self.log.finish();
+        Ok(Report {
+            ended,
+            time: now - self.begun,
+            wall: (os::monotonic() - host) as f64 * 1e-9,
+            view,
+            incidents: self.router.incidents,
+            log_dropped,
+        })
+    }
+
+    /// What the control side does without being asked.
+    fn look(&mut self, next_look: &mut Time) -> Result<Option<String>, CannotRun> {
+        let now = self.clock.now();
+        let since = now - self.begun;
+        while let Some((at, request, words)) = self.timed.next_if(|(at, _, _)| *at <= since) {
+            if matches!(request, Request::Quit) {
+                return Ok(Some("the plan said quit".into()));
+            }
+            let said = match self.apply(request) {
+                Ok(()) => format!("asked: {words}"),
+                Err(refusal) => format!("asked: {words}; refused: {refusal}"),
+            };
+            self.router.incidents.push(Incident { time: self.begun + at, agent: "plan".into(), what: said });
+        }
+        self.note_grants();
+        self.make_spares()?;
+        let mut fabric = Threads { cells: &self.cells, waited: None };
+        self.router.supervise(now, &mut fabric);
+        for incident in &self.router.incidents[self.incidents_seen..] {
+            self.router.log_shared.note(incident.time, &incident.agent, &incident.what);
+        }
+        self.incidents_seen = self.router.incidents.len();
+        if self.hung.load(Ordering::Relaxed) as usize > MOST_HUNG {
+            return Ok(Some(format!("more than {MOST_HUNG} steps did not return")));
+        }
+        if now >= *next_look {
+            *next_look = now + self.options.observer.every().max(Duration::millis(1));
+            if let Verdict::End(reason) = self.options.observer.observe(now, &self.router.incidents) {
+                return Ok(Some(reason));
+            }
+        }
+        Ok(self.options.limit.is_some_and(|limit| since >= limit).then(|| "the time is over".into()))
+    }
+
+    fn note_grants(&mut self) {
+        for (cell, known) in self.cells.iter().zip(&mut self.router.executors) {
+            if let Some(granted) = cell.granted.lock().unwrap_or_else(PoisonError::into_inner).take() {
+                known.granted = granted;
+            }
+        }
+    }
+
+    /// Where a spare thread has taken over, another is made.
+    fn make_spares(&mut self) -> Result<(), CannotRun> {
+        for at in 0..self.cells.len() {
+            if self.cells[at].call.swap(NOBODY, Ordering::AcqRel) == CALLED {
+                self.spawn_spare(at)?;
+            }
+        }
+        Ok(())
+    }
+
+    fn apply(&mut self, request: Request) -> Result<(), Refusal> {
+        let mut fabric = Threads { cells: &self.cells, waited: None };
+        self.router.apply(request, self.clock.now(), &mut fabric)
+    }
+
+    fn answer(&mut self, ask: Ask) -> Option<String> {
+        let now = self.clock.now();
+        match ask {
+            Ask::Request(request, answer) => {
+                let quits = matches!(request, Request::Quit);
+                let said = format!("{request:?}");
+                let result = self.apply(request);
+                let outcome =
+                    result.as_ref().err().map_or(String::new(), |refusal| format!("; refused: {refusal}"));
+                self.router.log_shared.note(now, "control", &format!("asked: {said}{outcome}"));
+                // Whoever asked may be gone.
+                let _ = answer.send(result);
+                return quits.then(|| "asked to quit".into());
+            }
+            Ask::View(answer) => drop(answer.send(self.router.view(now))),
+            Ask::Plan(answer) => drop(answer.send(self.router.to_plan())),
+            Ask::Tap(port, answer) => drop(answer.send(self.router.tap(&port))),
+            Ask::Untap(port) => self.router.untap(&port),
+        }
+        None
+    }
+
+    /// Stops the agents, then the threads. A thread in a step that does not return is left behind.
+    fn end(&mut self) {
+        let mut fabric = Threads { cells: &self.cells, waited: None };
+        self.router.stop_all(&mut fabric);
+        for cell in &self.cells {
+            cell.stop.store(true, Ordering::Release);
+            cell.call.store(STOPPED, Ordering::Release);
+            os::futex_wake(&cell.call);
+            cell.door.ring(CHANGES);
+        }
+        self.over.store(true, Ordering::Release);
+        self.guards.drain(..).for_each(|thread| drop(thread.join()));
+        let patience = os::monotonic() + PATIENCE.0;
+        while self.threads.iter().any(|thread| !thread.is_finished()) && os::monotonic() < patience {
+            for cell in &self.cells {
+                os::futex_wake(&cell.call);
+                cell.door.ring(CHANGES);
+            }
+            std::thread::park_timeout(HostDuration::from_millis(1));
+        }
+        self.threads.drain(..).filter(|thread| thread.is_finished()).for_each(|thread| drop(thread.join()));
+    }
+}
+
+/// Serves changes by waking the executor's thread and waiting for it.
+struct Threads<'a> {
+    cells: &'a [Arc<Cell>],
+    waited: Option<i64>,
+}
+
+impl Fabric for Threads<'_> {
+    fn pump(&mut self, executor: usize) -> bool {
+        let now = os::monotonic();
+        match self.waited {
+            None => {
+                self.cells[executor].door.ring(CHANGES);
+                self.waited = Some(now);
+            }
+            Some(_) => std::thread::park_timeout(HostDuration::from_micros(20)),
+        }
+        let go_on = now - self.waited.unwrap_or(now) < PATIENCE.0;
+        if !go_on {
+            self.waited = None;
+        }
+        go_on
+    }
+
+    fn answered(&mut self) {
+        self.waited = None;
+    }
+}
+
+/// What stands in the word on which a spare thread waits.
+const CALLED: u32 = 1;
+const STOPPED: u32 = 2;
+
+fn thread_main(
+    cell: &Cell,
+    number: u32,
+    plan: &ExecutorPlan,
+    clock: WallClock,
+    log: Option<trace::Writer>,
+    directory: Arc<Directory>,
+    witness: &Witness,
+) {
+    os::touch_stack();
+    os::exact_timers();
+    let granted = ask_for(plan);
+    let context = Context::new(log, directory);
+    let _entered = context.enter();
+    // A spare thread sleeps here until the core is its own.
+    while cell.owner.load(Ordering::Acquire) != number {
+        if cell.stop.load(Ordering::Acquire) {
+            return;
+        }
+        if cell.call.load(Ordering::Acquire) == CALLED {
+            // The watchdog has called: whoever waits may take the core that was given up.
+            let given_up = cell.given_up.load(Ordering::Acquire);
+            let from = cell.owner.load(Ordering::Acquire);
+            if given_up != 0
+                && from >= HANDED
+                && cell.owner.compare_exchange(from, number, Ordering::AcqRel, Ordering::Relaxed).is_ok()
+            {
+                cell.given_up.store(0, Ordering::Release);
+                cell.claim.store(0, Ordering::Release);
+                // SAFETY: the exchange made the core this thread's own.
+                let core = unsafe { &mut *cell.core.get() };
+                core.running.slot.store(0, Ordering::Relaxed);
+                core.give_up(given_up - 1, clock.now());
+                core.find_ready();
+                break;
+            }
+        }
+        os::futex_wait(&cell.call, cell.call.load(Ordering::Acquire) & !CALLED, None);
+    }
+    cell.thread.store(os::thread_id(), Ordering::Release);
+    *cell.granted.lock().unwrap_or_else(PoisonError::into_inner) = Some(granted);
+    run_core(cell, number, plan, clock, &context, witness);
+}
+
+/// Asks for what the plan says, and tells what was granted.
+fn ask_for(plan: &ExecutorPlan) -> String {
+    let mut told = String::new();
+    if !plan.cpus.is_empty()
+        && let Err(error) = os::set_affinity(&plan.cpus)
+    {
+        told = format!(", not on processors {:?}: {error}", plan.cpus);
+    }
+    match plan.priority.map(os::set_fifo) {
+        None => format!("ordinary{told}"),
+        Some(Ok(())) => {
+            let (policy, priority) = os::granted();
+            if policy == libc::SCHED_FIFO {
+                format!("fifo {priority}{told}")
+            } else {
+                format!("policy {policy}{told}")
+            }
+        }
+        Some(Err(error)) => format!("ordinary ({error}){told}"),
+    }
+}
+
+fn run_core(
+    cell: &Cell,
+    number: u32,
+    plan: &ExecutorPlan,
+    clock: WallClock,
+    context: &Context,
+    witness: &Witness,
+) {
+    let core = cell.core.get();
+    loop {
+        let now = clock.now();
+        let job = {
+            // SAFETY: the core is this thread's own, and the borrow ends before the step.
+            let core = unsafe { &mut *core };
+            core.look_at_door(context, now);
+            core.next(now)
+        };
+        if let Some(job) = job {
+            let mine = || is_mine(cell, number);
+            // SAFETY: the core is this thread's own; `mine` says whether it still is after the step.
+            let ended = unsafe { Core::run(core, context, job, now, Some(witness), mine) };
+            match ended {
+                None => return,
+                Some(Ended::AskedToHang(slot)) => {
+                    if !hang(cell, number, slot) {
+                        return;
+                    }
+                }
+                Some(_) => {}
+            }
+            continue;
+        }
+        if cell.stop.load(Ordering::Acquire) {
+            return;
+        }
+        // SAFETY: as above.
+        let next = unsafe { (*core).next_release() };
+        let until = clock.monotonic(next);
+        match until {
+            Some(until) if plan.spin > Duration::ZERO => {
+                if until - os::monotonic() > plan.spin.0 {
+                    cell.door.sleep(Some(until - plan.spin.0));
+                } else {
+                    core::hint::spin_loop();
+                }
+            }
+            _ => cell.door.sleep(until),
+        }
+    }
+}
+
+/// On request, an agent that does not return: the thread keeps its processor until the watchdog has given it up. Says whether
+/// the core is still this thread's.
+fn hang(cell: &Cell, number: u32, slot: u32) -> bool {
+    cell.running.since.store(os::ticks(), Ordering::Relaxed);
+    cell.running.steps.store(cell.running.steps.load(Ordering::Relaxed) + 1, Ordering::Relaxed);
+    cell.running.slot.store(slot + 1, Ordering::Release);
+    while cell.owner.load(Ordering::Acquire) == number && !cell.stop.load(Ordering::Acquire) {
+        core::hint::spin_loop();
+    }
+    let mine = is_mine(cell, number);
+    if mine {
+        cell.running.slot.store(0, Ordering::Relaxed);
+    }
+    mine
+}
+
+/// Owners at or above this number are marks of the watchdog: the core is on its way to another thread.
+const HANDED: u32 = 1_000_000;
+
+/// After a step: whether the core is still this thread's own. The usual case costs one load; the watchdog's side makes the
+/// barrier that orders it behind what the step published.
+#[inline]
+fn is_mine(cell: &Cell, number: u32) -> bool {
+    if cell.owner.load(Ordering::Relaxed) == number {
+        return true;
+    }
+    // The watchdog is about to give this thread up. Whoever claims first has the core.
+    if cell.claim.compare_exchange(0, number, Ordering::AcqRel, Ordering::Acquire).is_ok() {
+        cell.owner.store(number, Ordering::Release);
+        cell.claim.store(0, Ordering::Release);
+        return true;
+    }
+    false
+}
+
+/// The watchdog: sees steps that last too long, gives their threads up, and hands what else they ran to the spare ones.
+fn watch(cells: &[Arc<Cell>], over: &AtomicBool, hung: &AtomicU32, next: &AtomicU32) {
+    os::exact_timers();
+    // Without the right to a priority it watches all the same, later.
+    let _ = os::set_fifo(WATCHDOG_PRIORITY);
+    let word = AtomicU32::new(0);
+    let nanos_per_tick = os::nanos_per_tick();
+    while !over.load(Ordering::Acquire) {
+        os::futex_wait(&word, 0, Some(os::monotonic() + WATCHDOG_PERIOD.0));
+        for cell in cells {
+            let running = &cell.running;
+            let (slot, steps) = (running.slot.load(Ordering::Acquire), running.steps.load(Ordering::Acquire));
+            if slot == 0 {
+                continue;
+            }
+            let lasts =
+                os::ticks().saturating_sub(running.since.load(Ordering::Acquire)) as f64 * nanos_per_tick;
+            if lasts > running.limit.load(Ordering::Acquire) as f64 && take_over(cell, slot, steps, next) {
+                hung.fetch_add(1, Ordering::Relaxed);
+            }
+        }
+    }
+}
+
+/// Takes a core away from a thread that does not come back.
+fn take_over(cell: &Cell, slot: u32, steps: u64, next: &AtomicU32) -> bool {
+    let owner = cell.owner.load(Ordering::Acquire);
+    if owner >= HANDED || cell.call.load(Ordering::Acquire) != NOBODY {
+        // It is on its way already, or no spare thread is there yet.
+        return false;
+    }
+    let mark = next.fetch_add(1, Ordering::Relaxed);
+    cell.owner.store(mark, Ordering::SeqCst);
+    // After this, either the thread is still in the step and will see the mark, or it has left it and that is seen here.
+    os::barrier_everywhere();
+    let still_in = cell.running.slot.load(Ordering::SeqCst) == slot
+        && cell.running.steps.load(Ordering::SeqCst) == steps;
+    if !still_in {
+        // It came back and is at work: the mark is taken off, unless the thread has seen it and done so itself.
+        let _ = cell.owner.compare_exchange(mark, owner, Ordering::AcqRel, Ordering::Relaxed);
+        return false;
+    }
+    if cell.claim.compare_exchange(0, mark, Ordering::AcqRel, Ordering::Acquire).is_err() {
+        return false;
+    }
+    // A failure leaves the thread where it is, at its priority; there is nothing else to be done about it.
+    let _ = os::set_idle(cell.thread.load(Ordering::Acquire));
+    cell.given_up.store(slot, Ordering::Release);
+    cell.call.store(CALLED, Ordering::Release);
+    os::futex_wake(&cell.call);
+    true
+}
