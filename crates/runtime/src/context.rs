@@ -68,10 +68,6 @@ impl ReadySet {
             bits = *words.get(word)?;
         }
     }
-
-    pub(crate) fn any(&self) -> bool {
-        self.words().iter().any(|word| *word != 0)
-    }
 }
 
 /// What is known of a panic: a fixed record, written without allocation.

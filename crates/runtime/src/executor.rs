@@ -19,7 +19,7 @@ use crate::agent::{Body, Fault, Step};
 use crate::context::{Context, ReadySet};
 use crate::door::{CHANGES, Door};
 use crate::os;
-use crate::port::{InputEnd, OutputEnd, PortEnds, WireId};
+use crate::port::{InputEnd, OutputEnd, WireId};
 use crate::stats::{AgentStats, bump, nanos};
 use crate::witness::Witness;
 
@@ -39,7 +39,6 @@ pub(crate) struct Seat {
     pub id: AgentId,
     pub name: Name,
     pub body: Option<Box<dyn Body>>,
-    pub ends: Vec<PortEnds>,
     /// The inputs whose messages make it run.
     pub on: Vec<Arc<dyn InputEnd>>,
     pub timing: Timing,
@@ -89,6 +88,7 @@ impl core::fmt::Display for Cause {
 }
 
 /// What is known of a death on the side where it happened, without memory of its own.
+#[allow(clippy::large_enum_variant)] // the record is there so that no memory is needed for it
 pub(crate) enum RawCause {
     Fault(Fault),
     Panic(crate::context::PanicRecord, Box<dyn Any + Send>),
@@ -220,7 +220,6 @@ pub(crate) struct Link {
     pub changes: rtrb::Producer<Change>,
     pub answers: rtrb::Consumer<Answer>,
     pub door: Arc<Door>,
-    pub running: Arc<Running>,
 }
 
 /// How many changes or answers can be under way.
@@ -253,12 +252,12 @@ impl Core {
             due: BinaryHeap::new(),
             cursor: 0,
             door: door.clone(),
-            running: running.clone(),
+            running,
             changes,
             answers,
             nanos_per_tick: os::nanos_per_tick(),
         };
-        (core, Link { changes: change_in, answers: answer_out, door, running })
+        (core, Link { changes: change_in, answers: answer_out, door })
     }
 
     /// When the next agent is due by the clock.
@@ -294,11 +293,6 @@ impl Core {
                 self.ready.mark(slot);
             }
         }
-    }
-
-    /// Whether something is to be done at `now`.
-    pub(crate) fn has_work(&self, now: Time) -> bool {
-        !self.due.is_empty() || self.next_release() <= now || self.ready.any()
     }
 
     /// The agent that runs next: of those that are due the one with the earliest deadline, else the next one in data-flow order
@@ -389,8 +383,8 @@ impl Core {
         witness: Option<&Witness>,
         still_mine: impl FnOnce() -> bool,
     ) -> Option<Ended> {
-        // SAFETY: the caller owns the core; this borrow ends before the step.
         let (body, mut step, begun) = {
+            // SAFETY: the caller owns the core; this borrow ends before the step.
             let core = unsafe { &mut *core };
             let Some(seat) = core.seats.get_mut(job.slot as usize).and_then(Option::as_mut) else {
                 return Some(Ended::NotRun);

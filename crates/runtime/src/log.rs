@@ -26,10 +26,12 @@ pub trait Recorder: Send {
     fn finish(&mut self);
 }
 
+type Choose = dyn Fn(&str, &'static MessageType) -> u32 + Send + Sync;
+
 /// Which outputs are logged.
 #[derive(Clone)]
 pub struct LogChoice {
-    every: Arc<dyn Fn(&str, &'static MessageType) -> u32 + Send + Sync>,
+    every: Arc<Choose>,
 }
 
 impl Default for LogChoice {

@@ -56,7 +56,7 @@ pub(crate) struct Link {
 
 /// How much a memory holds.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Form {
+pub(crate) struct Form {
     /// How many messages stay to be looked up.
     pub history: usize,
     /// How many readers can be seated.
@@ -66,7 +66,7 @@ pub struct Form {
 }
 
 /// How many slots one reader can hold at once.
-pub const HELD_BY_A_SEAT: usize = 2;
+pub(crate) const HELD_BY_A_SEAT: usize = 2;
 
 /// The writing end.
 pub(crate) struct Writer<T: Message> {
@@ -351,7 +351,8 @@ impl<T: Message> Drop for Pin<'_, T> {
     }
 }
 
-#[cfg(all(test, not(loom)))]
+#[cfg(test)]
+#[cfg(not(loom))]
 mod tests {
     use super::*;
     use types::messages::{Image, Odometry, Twist};
@@ -423,7 +424,8 @@ mod tests {
     }
 }
 
-#[cfg(all(test, loom))]
+#[cfg(test)]
+#[cfg(loom)]
 mod model {
     use super::*;
     use loom::thread;

@@ -52,11 +52,6 @@ pub(crate) fn realtime() -> i64 {
     clock(libc::CLOCK_REALTIME)
 }
 
-/// Processor time of the calling thread (ns).
-pub(crate) fn thread_time() -> i64 {
-    clock(libc::CLOCK_THREAD_CPUTIME_ID)
-}
-
 fn checked(result: libc::c_int) -> io::Result<()> {
     if result == 0 { Ok(()) } else { Err(io::Error::last_os_error()) }
 }

@@ -179,9 +179,10 @@ impl Plan {
     }
 
     /// Wires an output to an input of the same type, or a client to a service. The compiler checks the types.
-    pub fn wire<E: Clone, F: Clone>(&mut self, from: &E, to: &F)
+    pub fn wire<E, F>(&mut self, from: &E, to: &F)
     where
-        E: Wirable<F>,
+        E: Wirable<F> + Clone,
+        F: Clone,
     {
         let (from, to) = from.clone().ends(to.clone());
         self.wires.push(WirePlan::new(from, to));

@@ -4,35 +4,29 @@
 //! here once all have answered. The order is fixed: the receiver joins before the sender adds; the sender forgets before the
 //! receiver leaves, and a receiver that is not drained yet is asked again.
 
+mod deaths;
+mod view;
+mod wires;
+
 use core::sync::atomic::Ordering::Relaxed;
 use std::sync::Arc;
 
 use types::value::Table;
-use types::{AgentId, Duration, Filter, Name, Priority, Time};
+use types::{AgentId, Duration, Filter, Name, Time};
 
 use crate::agent::{AgentType, Body, Registry};
-use crate::executor::{Answer, Cause, Change, Link, RawCause, Seat, Timing, heaps_for};
+use crate::executor::{Answer, Change, Link, Seat, Timing, heaps_for};
 use crate::log::{LogChoice, LogShared};
 use crate::names::Directory;
-use crate::plan::{AgentPlan, ExecutorPlan, OnDeath, USUAL_DEPTH, USUAL_DEPTH_ON, WirePlan};
-use crate::port::{Direction, InputEnd, NoSeat, OutputEnd, PortEnds, Target, WireCounts, WireId, WireSpec};
-use crate::request::{
-    AgentState, AgentView, Counts, FaultKind, PortView, Refusal, Request, SystemView, WireView,
-};
+use crate::plan::{AgentPlan, ExecutorPlan, WirePlan};
+use crate::port::{Direction, OutputEnd, PortEnds, WireCounts, WireId};
+use crate::request::{AgentState, FaultKind, Refusal, Request};
 use crate::ring::Overload;
-use crate::service::answers_for;
 use crate::stats::AgentStats;
 use crate::tap::Tap;
 
 /// Readers for which an output's memory has room besides those in the plan.
 const SPARE_SEATS: usize = 8;
-
-/// Restart waits this long after the first death, and twice as long after each that follows.
-const FIRST_PAUSE: Duration = Duration::millis(100);
-const LONGEST_PAUSE: Duration = Duration::secs(5);
-/// More deaths than this within a minute, and the agent is left dead.
-const MOST_RESTARTS: usize = 5;
-const RESTARTS_WITHIN: Duration = Duration::secs(60);
 
 /// Unless the plan says otherwise, a step hangs when it takes four times its deadline, and at least this.
 const LEAST_HANG: Duration = Duration::millis(50);
@@ -107,6 +101,8 @@ pub(crate) struct Router {
     next_agent: u32,
     next_wire: u32,
     pub incidents: Vec<Incident>,
+    /// At least as many as wait to be started again: who is dead is looked for only when somebody is.
+    restarting: usize,
     /// Deaths that were read while waiting for something else.
     died: Vec<(usize, Answer)>,
     log: LogChoice,
@@ -134,6 +130,7 @@ impl Router {
             next_agent: 0,
             next_wire: 0,
             incidents: Vec::new(),
+            restarting: 0,
             died: Vec::new(),
             log: LogChoice::default(),
             log_shared: LogShared::new(),
@@ -363,7 +360,6 @@ impl Router {
             id,
             name: Name::new(&plan.name),
             body: Some(body),
-            ends: ends.clone(),
             on,
             timing,
             stats: stats.clone(),
@@ -620,216 +616,6 @@ impl Router {
         }
     }
 
-    fn find_wire(&self, from: &str, to: &str) -> Option<&Wire> {
-        let (from, to) = (self.port(from).ok()?, self.port(to).ok()?);
-        let (from, to) = ((self.agents[from.0].id, from.1), (self.agents[to.0].id, to.1));
-        self.wires.iter().find(|wire| wire.from == from && wire.to == to && !wire.is_answer)
-    }
-
-    fn plan_of(&self, wire: &Wire) -> WirePlan {
-        let name = |(id, port): (AgentId, usize)| {
-            self.by_id(id).map_or_else(String::new, |known| {
-                format!("{}.{}", known.plan.name, known.kind.ports[port].name)
-            })
-        };
-        let mut plan = WirePlan::new(name(wire.from), name(wire.to));
-        (plan.depth, plan.overload, plan.filter) = (Some(wire.depth), Some(wire.overload), wire.filter);
-        plan
-    }
-
-    /// Makes a wire.
-    pub(crate) fn wire(&mut self, plan: &WirePlan, fabric: &mut dyn Fabric) -> Reply<()> {
-        let (from, to) = (self.port(&plan.from)?, self.port(&plan.to)?);
-        if self.find_wire(&plan.from, &plan.to).is_some() {
-            return Err(Refusal::new(format!("{} is already wired to {}", plan.from, plan.to)));
-        }
-        let (out_port, in_port) =
-            (&self.agents[from.0].kind.ports[from.1], &self.agents[to.0].kind.ports[to.1]);
-        match (out_port.shape.direction, in_port.shape.direction) {
-            (Direction::Output, Direction::Input) => {
-                self.check_types(plan, from, to)?;
-                self.join(from, to, plan, plan.filter, false, fabric).map(drop)
-            }
-            (Direction::Client, Direction::Service) => {
-                self.check_types(plan, from, to)?;
-                self.check_types(plan, to, from)?;
-                let filter = answers_for(self.agents[from.0].id);
-                let answers = self.join(to, from, plan, filter, true, fabric)?;
-                let calls = self.join(from, to, plan, plan.filter, false, fabric)?;
-                if let Some(wire) = self.wires.iter_mut().find(|wire| wire.id == calls) {
-                    wire.partner = Some(answers);
-                }
-                Ok(())
-            }
-            (Direction::Input, Direction::Output) | (Direction::Service, Direction::Client) => {
-                Err(Refusal::new(format!("{} and {} are the wrong way round", plan.from, plan.to))
-                    .help(format!("\"{}\" = [\"{}\"]", plan.to, plan.from)))
-            }
-            (a, b) => {
-                Err(Refusal::new(format!("{} is an {}, {} an {}", plan.from, a.name(), plan.to, b.name()))
-                    .help("a wire leads from an output to an input, or from a client to a service"))
-            }
-        }
-    }
-
-    fn check_types(&self, plan: &WirePlan, from: (usize, usize), to: (usize, usize)) -> Reply<()> {
-        let out = self.agents[from.0].ends[from.1].output.as_ref().map(|end| end.message_type());
-        let into = self.agents[to.0].ends[to.1].input.as_ref().map(|end| end.message_type());
-        match (out, into) {
-            (Some(out), Some(into)) if out == into => Ok(()),
-            (Some(out), Some(into)) => {
-                let fits: Vec<String> = self.agents[from.0]
-                    .kind
-                    .ports
-                    .iter()
-                    .filter(|port| port.shape.output == Some(into))
-                    .map(|port| format!("{}.{}", self.agents[from.0].plan.name, port.name))
-                    .collect();
-                let refusal = Refusal::new(format!(
-                    "{} sends {}, {} takes {}",
-                    plan.from,
-                    out.short_name(),
-                    plan.to,
-                    into.short_name()
-                ));
-                Err(if fits.is_empty() {
-                    refusal
-                } else {
-                    refusal.help(format!("did you mean {}?", fits.join(" or ")))
-                })
-            }
-            _ => Err(Refusal::new(format!("{} cannot be wired to {}", plan.from, plan.to))),
-        }
-    }
-
-    /// Makes one ring wire: the receiver joins, then the sender adds.
-    fn join(
-        &mut self,
-        from: (usize, usize),
-        to: (usize, usize),
-        plan: &WirePlan,
-        filter: Filter,
-        is_answer: bool,
-        fabric: &mut dyn Fabric,
-    ) -> Reply<WireId> {
-        let (sender, receiver) = (&self.agents[from.0], &self.agents[to.0]);
-        let (Some(output), Some(input)) =
-            (sender.ends[from.1].output.clone(), receiver.ends[to.1].input.clone())
-        else {
-            return Err(Refusal::new(format!("{} cannot be wired to {}", plan.from, plan.to)));
-        };
-        let port = &receiver.kind.ports[to.1];
-        let answers = port.shape.direction == Direction::Client;
-        let wakes = answers || receiver.plan.on.iter().any(|on| on == port.name);
-        let depth = plan.depth.unwrap_or(if wakes { USUAL_DEPTH_ON } else { USUAL_DEPTH });
-        let overload = plan.overload.unwrap_or(if wakes { Overload::Refuse } else { Overload::NewestWins });
-        if depth == 0 || depth > crate::ring::MOST_MESSAGES {
-            let most = crate::ring::MOST_MESSAGES;
-            return Err(Refusal::new(format!("a wire holds from 1 to {most} messages, not {depth}")));
-        }
-        let target = Target {
-            executor: receiver.executor as u32,
-            slot: receiver.slot,
-            door: self.executors[receiver.executor].link.door.clone(),
-            wakes,
-        };
-        let id = WireId(self.next_wire);
-        let counts = Arc::new(WireCounts::default());
-        let spec =
-            WireSpec { id, sender: sender.id, depth, overload, filter, target, counts: counts.clone() };
-        let mut priorities: Vec<Priority> = sender.kind.ports[from.1].options.priorities().collect();
-        priorities.sort_unstable_by(|a, b| b.cmp(a));
-        if priorities.is_empty() {
-            priorities.push(Priority::Normal);
-        }
-        let (from_id, to_id) = ((sender.id, from.1), (receiver.id, to.1));
-        let routes = self.wires.iter().filter(|wire| wire.from == from_id).count();
-        let lanes = self.wires.iter().filter(|wire| wire.to == to_id).count() * Priority::ALL.len();
-        let prepared = output.prepare(&spec, &priorities, routes, lanes).map_err(|NoSeat { seats }| {
-            Refusal::new(format!("{} has readers on all {seats} seats of its memory", plan.from))
-        })?;
-        let (sender_executor, receiver_executor, slot) = (sender.executor, receiver.executor, receiver.slot);
-        self.next_wire += 1;
-        self.commit(receiver_executor, Change::Join { end: input, lanes: prepared.lanes, slot }, fabric)?;
-        self.commit(sender_executor, Change::Route { end: output, route: prepared.route }, fabric)?;
-        self.wires.push(Wire {
-            id,
-            from: from_id,
-            to: to_id,
-            partner: None,
-            is_answer,
-            depth,
-            overload,
-            filter,
-            counts,
-        });
-        if sender_executor == receiver_executor && wakes {
-            self.commit_order(sender_executor, fabric)?;
-        }
-        Ok(id)
-    }
-
-    fn unwire(&mut self, from: &str, to: &str, fabric: &mut dyn Fabric) -> Reply<()> {
-        self.port(from)?;
-        self.port(to)?;
-        let Some(wire) = self.find_wire(from, to) else {
-            let ends = self.port(from)?;
-            let id = (self.agents[ends.0].id, ends.1);
-            let known: Vec<String> =
-                self.wires.iter().filter(|wire| wire.from == id).map(|w| self.plan_of(w).to).collect();
-            let refusal = Refusal::new(format!("{from} is not wired to {to}"));
-            return Err(if known.is_empty() {
-                refusal
-            } else {
-                refusal.help(format!("it is wired to {}", known.join(", ")))
-            });
-        };
-        let (id, partner) = (wire.id, wire.partner);
-        self.cut(id, false, fabric)?;
-        partner.map_or(Ok(()), |partner| self.cut(partner, false, fabric))
-    }
-
-    /// Cuts one ring wire: the sender forgets, then the receiver leaves, when it is drained unless that is not waited for.
-    fn cut(&mut self, id: WireId, force: bool, fabric: &mut dyn Fabric) -> Reply<()> {
-        let Some(wire) = self.wires.iter().find(|wire| wire.id == id) else { return Ok(()) };
-        let (from, to) = (wire.from, wire.to);
-        let end =
-            |id: AgentId, port: usize| self.by_id(id).map(|known| (known.executor, known.ends[port].clone()));
-        if let Some((executor, PortEnds { output: Some(end), .. })) = end(from.0, from.1) {
-            let into = end.forgetting_box();
-            self.commit(executor, Change::Forget { end, wire: id, into }, fabric)?;
-        }
-        let end =
-            |id: AgentId, port: usize| self.by_id(id).map(|known| (known.executor, known.ends[port].clone()));
-        if let Some((executor, PortEnds { input: Some(end), .. })) = end(to.0, to.1) {
-            self.leave(executor, end, id, force, fabric)?;
-        }
-        self.wires.retain(|wire| wire.id != id);
-        Ok(())
-    }
-
-    fn leave(
-        &mut self,
-        executor: usize,
-        end: Arc<dyn InputEnd>,
-        wire: WireId,
-        force: bool,
-        fabric: &mut dyn Fabric,
-    ) -> Reply<()> {
-        // A receiver that takes nothing any more is not waited for: what lies in its mailbox is counted as dropped.
-        const PATIENCE: usize = 100;
-        for attempt in 0.. {
-            let into = end.leaving_box();
-            let change = Change::Leave { end: end.clone(), wire, into, force: force || attempt >= PATIENCE };
-            if self.commit_and_get(executor, change, fabric).is_ok_and(
-                |change| matches!(change, Change::Leave { force, .. } if force || attempt < PATIENCE),
-            ) {
-                return Ok(());
-            }
-        }
-        Ok(())
-    }
-
     /// Computes the data-flow order of an executor and gives it to it.
     fn commit_order(&mut self, executor: usize, fabric: &mut dyn Fabric) -> Reply<()> {
         let order = self.data_flow_order(executor);
@@ -906,148 +692,6 @@ impl Router {
         }
     }
 
-    /// Looks for deaths, and starts again who is due. Gives the time at which it wants to look again.
-    pub(crate) fn supervise(&mut self, now: Time, fabric: &mut dyn Fabric) -> Time {
-        for executor in 0..self.executors.len() {
-            while let Ok(answer) = self.executors[executor].link.answers.pop() {
-                self.died.push((executor, answer));
-            }
-        }
-        for (executor, answer) in core::mem::take(&mut self.died) {
-            if let Answer::Died { slot, id, time, cause, body } = answer {
-                let hung = matches!(cause, RawCause::Hang);
-                self.bury(executor, slot, id, time, cause);
-                drop(body);
-                if hung {
-                    self.renew(id, fabric);
-                }
-            }
-        }
-        let mut next = Time::NEVER;
-        for at in 0..self.agents.len() {
-            let known = &mut self.agents[at];
-            if known.state != AgentState::Restarting {
-                continue;
-            }
-            if known.restart_at > now {
-                next = next.min(known.restart_at);
-                continue;
-            }
-            let body = known.spare.take().map_or_else(|| known.kind.build(&known.params), Ok);
-            match body {
-                Ok(body) => {
-                    let name = known.plan.name.clone();
-                    match self.install(at, body, fabric) {
-                        Ok(()) => self.incidents.push(Incident {
-                            time: now,
-                            agent: name,
-                            what: "started again".into(),
-                        }),
-                        Err(refusal) => {
-                            self.incidents.push(Incident {
-                                time: now,
-                                agent: name,
-                                what: format!("not started again: {refusal}"),
-                            });
-                            self.agents[at].state = AgentState::Dead;
-                        }
-                    }
-                    let known = &mut self.agents[at];
-                    known.spare = known.kind.build(&known.params).ok();
-                }
-                Err(_) => known.state = AgentState::Dead,
-            }
-        }
-        next
-    }
-
-    /// Gives an agent whose step did not return new ports and a new number. Its old ones may still be in use by the step: they
-    /// are left to it, nobody listens to them any more, and nobody sends to them.
-    fn renew(&mut self, id: AgentId, fabric: &mut dyn Fabric) {
-        let Some(at) = self.agents.iter().position(|known| known.id == id) else { return };
-        let touched = |wire: &Wire| wire.from.0 == id || wire.to.0 == id;
-        let plans: Vec<WirePlan> = self
-            .wires
-            .iter()
-            .filter(|wire| touched(wire) && !wire.is_answer)
-            .map(|wire| self.plan_of(wire))
-            .collect();
-        let old: Vec<(WireId, (AgentId, usize), (AgentId, usize))> = self
-            .wires
-            .iter()
-            .filter(|wire| touched(wire))
-            .map(|wire| (wire.id, wire.from, wire.to))
-            .collect();
-        for (wire, from, to) in old {
-            let side = |id: AgentId, port: usize| {
-                self.by_id(id).map(|known| (known.executor, known.ends[port].clone()))
-            };
-            // What an executor does not answer to now, it does later: the change waits in its ring.
-            if from.0 != id
-                && let Some((executor, PortEnds { output: Some(end), .. })) = side(from.0, from.1)
-            {
-                let into = end.forgetting_box();
-                let _ = self.commit(executor, Change::Forget { end, wire, into }, fabric);
-            } else if to.0 != id
-                && let Some((executor, PortEnds { input: Some(end), .. })) = side(to.0, to.1)
-            {
-                let _ = self.leave(executor, end, wire, true, fabric);
-            }
-        }
-        self.wires.retain(|wire| wire.from.0 != id && wire.to.0 != id);
-        let known = self.agents.remove(at);
-        let _ = self.commit(known.executor, Change::Unseat { slot: known.slot, seat: None }, fabric);
-        self.executors[known.executor].slots[known.slot as usize] = false;
-        if self.add(known.plan, &[], fabric).is_err() {
-            return;
-        }
-        for plan in plans {
-            let _ = self.wire(&plan, fabric);
-        }
-        if let Some(new) = self.agents.last_mut() {
-            (new.deaths, new.last_death, new.restart_at) = (known.deaths, known.last_death, known.restart_at);
-            new.state = known.state;
-            let hangs = known.stats.hangs.load(Relaxed);
-            new.stats.hangs.store(hangs, Relaxed);
-            new.stats.restarts.store(known.stats.restarts.load(Relaxed), Relaxed);
-            let (executor, slot) = (new.executor, new.slot);
-            // It waits for its restart like everybody who died.
-            let _ = self.commit(executor, Change::Body { slot, body: None }, fabric);
-        }
-    }
-
-    fn bury(&mut self, executor: usize, slot: u32, id: AgentId, time: Time, cause: RawCause) {
-        let _ = executor;
-        let cause = match cause {
-            RawCause::Fault(fault) => Cause::Fault(fault),
-            RawCause::Hang => Cause::Hang,
-            RawCause::Panic(record, payload) => {
-                drop(payload);
-                Cause::Panic(record.to_text())
-            }
-        };
-        let Some(known) = self.agents.iter_mut().find(|known| known.id == id && known.slot == slot) else {
-            return;
-        };
-        known.last_death = Some(cause.to_string());
-        known.deaths.retain(|death| *death + RESTARTS_WITHIN > time);
-        known.deaths.push(time);
-        let deaths = known.deaths.len();
-        let mut what = cause.to_string();
-        if known.plan.on_death == OnDeath::Leave {
-            known.state = AgentState::Dead;
-            what += "; left dead, as its plan says";
-        } else if deaths > MOST_RESTARTS {
-            known.state = AgentState::Dead;
-            what += &format!("; left dead after {MOST_RESTARTS} restarts within a minute");
-        } else {
-            known.state = AgentState::Restarting;
-            let pause = Duration((FIRST_PAUSE.0 << (deaths - 1).min(16)).min(LONGEST_PAUSE.0));
-            known.restart_at = time + pause;
-        }
-        self.incidents.push(Incident { time, agent: known.plan.name.clone(), what });
-    }
-
     /// Ends all agents.
     pub(crate) fn stop_all(&mut self, fabric: &mut dyn Fabric) {
         for executor in 0..self.executors.len() {
@@ -1069,76 +713,6 @@ impl Router {
                 outputs.join(", ")
             ))
         })
-    }
-
-    /// What there is, as people ask for it.
-    pub(crate) fn view(&self, now: Time) -> SystemView {
-        let agents = self.agents.iter().map(|known| self.view_agent(known)).collect();
-        let wires =
-            self.wires.iter().filter(|wire| !wire.is_answer).map(|wire| self.view_wire(wire)).collect();
-        SystemView { name: self.name.clone(), now, agents, wires }
-    }
-
-    fn view_agent(&self, known: &Known) -> AgentView {
-        let stats = &known.stats;
-        let executor = &self.executors[known.executor];
-        let ports = known.kind.ports.iter().zip(&known.ends).map(|(port, end)| PortView {
-            name: port.name,
-            doc: port.doc,
-            direction: port.shape.direction,
-            message: port.shape.input.or(port.shape.output).map_or("", |message| message.short_name()),
-            sent: end.output.as_ref().map_or(0, |output| output.sent()),
-        });
-        AgentView {
-            id: known.id,
-            name: known.plan.name.clone(),
-            kind: known.kind.kind,
-            doc: known.kind.doc,
-            executor: executor.plan.name.clone(),
-            asked: executor.plan.priority.map_or("ordinary".into(), |priority| format!("fifo {priority}")),
-            granted: executor.granted.clone(),
-            state: known.state,
-            last_death: known.last_death.clone(),
-            period: (known.timing.period > Duration::ZERO).then_some(known.timing.period),
-            deadline: known.timing.deadline,
-            params: known.params.clone(),
-            fields: known.kind.params.clone(),
-            ports: ports.collect(),
-            counts: Counts {
-                releases: stats.releases.load(Relaxed),
-                missed: stats.missed.load(Relaxed),
-                stalled: stats.stalled.load(Relaxed),
-                skipped: stats.skipped.load(Relaxed),
-                faults: stats.faults.load(Relaxed),
-                panics: stats.panics.load(Relaxed),
-                hangs: stats.hangs.load(Relaxed),
-                restarts: stats.restarts.load(Relaxed),
-            },
-            exec: stats.exec.figure(),
-            jitter: stats.jitter.figure(),
-            response: stats.response.figure(),
-        }
-    }
-
-    fn view_wire(&self, wire: &Wire) -> WireView {
-        let plan = self.plan_of(wire);
-        let message = self
-            .by_id(wire.from.0)
-            .and_then(|known| known.ends[wire.from.1].output.as_ref())
-            .map_or("", |end| end.message_type().short_name());
-        WireView {
-            from: plan.from,
-            to: plan.to,
-            message,
-            depth: wire.depth,
-            overload: wire.overload,
-            filter: wire.filter,
-            sent: wire.counts.sent.load(Relaxed),
-            dropped: wire.counts.dropped.load(Relaxed),
-            refused: wire.counts.refused.load(Relaxed),
-            taken: wire.counts.taken.load(Relaxed),
-            expired: wire.counts.expired.load(Relaxed),
-        }
     }
 
     /// The running system as a plan that would start it.

@@ -189,6 +189,7 @@ fn play(simulation: Simulation) -> Result<Report, CannotRun> {
         wall: (os::monotonic() - begun) as f64 * 1e-9,
         view: router.view(now),
         incidents: router.incidents,
+        stalls: 0,
         log_dropped,
     })
 }
@@ -290,9 +291,9 @@ impl Player {
     fn answer(&mut self, ask: Ask) -> Option<String> {
         match ask {
             Ask::Request(request, answer) => {
-                let quits = matches!(request, Request::Quit);
+                let quits = matches!(*request, Request::Quit);
                 let said = format!("{request:?}");
-                let result = self.apply(request);
+                let result = self.apply(*request);
                 let outcome =
                     result.as_ref().err().map_or(String::new(), |refusal| format!("; refused: {refusal}"));
                 self.context.log(|log| log.line(self.now, "control", &format!("asked: {said}{outcome}")));

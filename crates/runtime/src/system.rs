@@ -17,7 +17,7 @@ use crate::tap::Tap;
 
 /// What somebody wants of a running system, on the way to it.
 pub(crate) enum Ask {
-    Request(Request, SyncSender<Result<(), Refusal>>),
+    Request(Box<Request>, SyncSender<Result<(), Refusal>>),
     View(SyncSender<SystemView>),
     Plan(SyncSender<(Vec<AgentPlan>, Vec<WirePlan>)>),
     Tap(String, SyncSender<Result<Tap, Refusal>>),
@@ -43,7 +43,7 @@ impl Control {
 
     /// Checks a request and does it whole, or refuses it with a reason.
     pub fn request(&self, request: Request) -> Result<(), Refusal> {
-        self.ask(|answer| Ask::Request(request, answer))?
+        self.ask(|answer| Ask::Request(Box::new(request), answer))?
     }
 
     /// What there is.
@@ -145,6 +145,8 @@ pub struct Report {
     pub view: SystemView,
     /// What the supervisor did.
     pub incidents: Vec<Incident>,
+    /// How often the witness saw a processor stand still.
+    pub stalls: u64,
     /// Records that found no room in the log.
     pub log_dropped: u64,
 }

@@ -47,7 +47,7 @@ pub(crate) struct Writer {
 }
 
 /// The end of the thread that keeps the log.
-pub struct Reader {
+pub(crate) struct Reader {
     shared: Arc<Shared>,
 }
 
@@ -65,7 +65,7 @@ pub(crate) fn ring(words: usize, waits: bool) -> (Writer, Reader) {
 }
 
 /// What stands in the log.
-pub enum Record<'a> {
+pub(crate) enum Record<'a> {
     /// A message that an output sent.
     Message {
         /// The number of the output.
@@ -201,7 +201,7 @@ impl Writer {
 
 impl Reader {
     /// Hands every record that waits to `each`. Says how many there were.
-    pub fn drain(&mut self, mut each: impl FnMut(Record<'_>)) -> usize {
+    pub(crate) fn drain(&mut self, mut each: impl FnMut(Record<'_>)) -> usize {
         let mut read = self.shared.read.load(Ordering::Relaxed);
         // Pairs with the release in `Writer::publish`.
         let written = self.shared.written.load(Ordering::Acquire);
@@ -222,7 +222,7 @@ impl Reader {
     }
 
     /// How many records found no room.
-    pub fn dropped(&self) -> u64 {
+    pub(crate) fn dropped(&self) -> u64 {
         self.shared.dropped.load(Ordering::Relaxed)
     }
 

@@ -296,6 +296,7 @@ impl Runner {
             wall: (os::monotonic() - host) as f64 * 1e-9,
             view,
             incidents: self.router.incidents,
+            stalls: self.witness.stalls(),
             log_dropped,
         })
     }
@@ -361,9 +362,9 @@ impl Runner {
         let now = self.clock.now();
         match ask {
             Ask::Request(request, answer) => {
-                let quits = matches!(request, Request::Quit);
+                let quits = matches!(*request, Request::Quit);
                 let said = format!("{request:?}");
-                let result = self.apply(request);
+                let result = self.apply(*request);
                 let outcome =
                     result.as_ref().err().map_or(String::new(), |refusal| format!("; refused: {refusal}"));
                 self.router.log_shared.note(now, "control", &format!("asked: {said}{outcome}"));

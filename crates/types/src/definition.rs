@@ -81,11 +81,9 @@ impl Kind {
 
     fn parts<'a>(&'a self, found: &mut Vec<&'a Definition>) {
         match self {
-            Kind::Struct(definition) => {
-                if !found.iter().any(|known| known.name == definition.name) {
-                    found.push(definition);
-                    definition.parts(found);
-                }
+            Kind::Struct(definition) if !found.iter().any(|known| known.name == definition.name) => {
+                found.push(definition);
+                definition.parts(found);
             }
             Kind::Array(of, _) | Kind::Sequence(of) => of.parts(found),
             _ => {}

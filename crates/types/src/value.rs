@@ -491,7 +491,7 @@ impl<'a> TableReader<'a> {
 
     /// A list of `N` numbers, such as a point or a colour.
     pub fn floats<const N: usize>(&mut self, key: &str) -> Option<[f64; N]> {
-        self.typed(key, &format!("a list of {N} numbers"), |value| floats(value))
+        self.typed(key, &format!("a list of {N} numbers"), floats)
     }
 
     /// A list of lists of `N` numbers, such as a poly-line.

@@ -1,5 +1,7 @@
 //! Whole systems, in simulated time and on the wall clock.
 
+#![allow(clippy::unwrap_used)] // a test may
+
 mod wall;
 
 use runtime::{

@@ -1,0 +1,323 @@
+//! Where messages come in: the mailbox, and the agent's handle on it.
+
+#![allow(unsafe_code)]
+
+use std::any::Any;
+use std::cell::UnsafeCell;
+use std::sync::Arc;
+
+use types::cdr::NoElement;
+use types::{Header, Message, Priority, Time};
+
+use super::{Direction, InputEnd, Parcel, Port, PortEnds, PortOptions, PortShape, WireCounts, WireId, count};
+use crate::memory::{Found, Link, Pin, Seat};
+use crate::message_type::MessageType;
+use crate::ring;
+
+pub(super) enum Source<T: Message> {
+    Value(ring::Receiver<Parcel<T>>),
+    Link(ring::Receiver<Parcel<Link>>, Seat<T>),
+}
+
+impl<T: Message> Source<T> {
+    fn advance(&mut self) -> bool {
+        match self {
+            Source::Value(receiver) => receiver.advance(),
+            Source::Link(receiver, _) => receiver.advance(),
+        }
+    }
+
+    fn has_message(&self) -> bool {
+        match self {
+            Source::Value(receiver) => receiver.has_message(),
+            Source::Link(receiver, _) => receiver.has_message(),
+        }
+    }
+
+    fn header(&self) -> &Header {
+        match self {
+            Source::Value(receiver) => &receiver.current().header,
+            Source::Link(receiver, _) => &receiver.current().header,
+        }
+    }
+}
+
+/// The receiving end of one ring of a wire.
+pub(super) struct Lane<T: Message> {
+    pub(super) wire: WireId,
+    pub(super) source: Source<T>,
+    pub(super) counts: Arc<WireCounts>,
+    /// Whether the ring's front has been taken and waits to be given to the agent.
+    pub(super) staged: bool,
+}
+
+/// The lanes of a new wire, with room for all that the input will then have.
+pub(super) struct NewLanes<T: Message> {
+    pub(super) lanes: Vec<Lane<T>>,
+    pub(super) room: Vec<Lane<T>>,
+}
+
+struct InputInner<T: Message> {
+    lanes: Vec<Lane<T>>,
+    taken: u64,
+    /// The lane that gave the last message, while all are passed over for the newest.
+    last: Option<usize>,
+}
+
+/// The mailbox behind an input.
+pub(crate) struct InputCore<T: Message> {
+    inner: UnsafeCell<InputInner<T>>,
+}
+
+// SAFETY: a mailbox is touched only by the thread that runs the executor of its agent; hand-overs of an executor between
+// threads pass through release and acquire.
+unsafe impl<T: Message> Sync for InputCore<T> {}
+// SAFETY: messages are plain data.
+unsafe impl<T: Message> Send for InputCore<T> {}
+
+impl<T: Message> InputCore<T> {
+    #[allow(clippy::mut_from_ref)]
+    #[inline]
+    fn inner(&self) -> &mut InputInner<T> {
+        // SAFETY: see `Sync`; no reference outlives the call of a port or of the executor.
+        unsafe { &mut *self.inner.get() }
+    }
+}
+
+impl<T: Message> InputEnd for InputCore<T> {
+    fn join(&self, lanes: &mut (dyn Any + Send)) {
+        let Some(new) = lanes.downcast_mut::<NewLanes<T>>() else { return };
+        let inner = self.inner();
+        if inner.lanes.capacity() < inner.lanes.len() + new.lanes.len() {
+            new.room.append(&mut inner.lanes);
+            core::mem::swap(&mut new.room, &mut inner.lanes);
+        }
+        inner.lanes.append(&mut new.lanes);
+    }
+
+    fn is_drained(&self, wire: WireId) -> bool {
+        self.inner()
+            .lanes
+            .iter()
+            .filter(|lane| lane.wire == wire)
+            .all(|lane| !lane.staged && !lane.source.has_message())
+    }
+
+    fn leave(&self, wire: WireId, into: &mut (dyn Any + Send)) {
+        let Some(into) = into.downcast_mut::<Vec<Lane<T>>>() else { return };
+        let lanes = &mut self.inner().lanes;
+        let mut i = 0;
+        while i < lanes.len() {
+            if lanes[i].wire == wire && into.len() < into.capacity() {
+                into.push(lanes.remove(i));
+            } else {
+                i += 1;
+            }
+        }
+        self.inner().last = None;
+    }
+
+    fn leaving_box(&self) -> Box<dyn Any + Send> {
+        Box::new(Vec::<Lane<T>>::with_capacity(Priority::ALL.len()))
+    }
+
+    fn has_message(&self) -> bool {
+        self.inner().lanes.iter().any(|lane| lane.staged || lane.source.has_message())
+    }
+
+    fn taken(&self) -> u64 {
+        self.inner().taken
+    }
+
+    fn message_type(&self) -> &'static MessageType {
+        MessageType::of::<T>()
+    }
+}
+
+/// An end where messages of type `T` come in.
+///
+/// Messages arrive while a step runs, never block it, and are taken in the order of priority, stamp and sender.
+pub struct Input<T: Message> {
+    core: Option<Arc<InputCore<T>>>,
+}
+
+impl<T: Message> Default for Input<T> {
+    fn default() -> Input<T> {
+        Input { core: None }
+    }
+}
+
+enum Place<'a, T: Message> {
+    Value(&'a T),
+    Pinned(Pin<'a, T>),
+}
+
+/// A message that was taken. It is read in place.
+pub struct Received<'a, T: Message> {
+    header: &'a Header,
+    place: Place<'a, T>,
+}
+
+impl<T: Message> Received<'_, T> {
+    /// What it carries besides its payload.
+    pub fn header(&self) -> &Header {
+        self.header
+    }
+
+    /// The row behind a large message.
+    pub fn row(&self) -> &[T::Element] {
+        match &self.place {
+            Place::Value(_) => &[],
+            Place::Pinned(pin) => pin.row(),
+        }
+    }
+}
+
+impl<T: Message> core::ops::Deref for Received<'_, T> {
+    type Target = T;
+    fn deref(&self) -> &T {
+        match &self.place {
+            Place::Value(value) => value,
+            Place::Pinned(pin) => pin.head(),
+        }
+    }
+}
+
+impl<T: Message> Input<T> {
+    /// The next message in the order of priority, stamp and sender.
+    #[inline]
+    pub fn take(&mut self) -> Option<Received<'_, T>> {
+        let inner = self.core.as_ref()?.inner();
+        loop {
+            let lane = inner.next()?;
+            // The borrow ends here when the message is gone, and the search goes on.
+            let lane: *const Lane<T> = &raw const inner.lanes[lane];
+            // SAFETY: lanes change only between steps; `&mut self` keeps the message from being taken twice.
+            if let Some(received) = unsafe { &*lane }.current() {
+                inner.taken += 1;
+                return Some(received);
+            }
+        }
+    }
+
+    /// The newest message, after passing over all that came before it; nothing when none has come since the last call.
+    pub fn newest(&mut self) -> Option<Received<'_, T>> {
+        let inner = self.core.as_ref()?.inner();
+        while let Some(lane) = inner.next() {
+            inner.taken += 1;
+            inner.last = Some(lane);
+            count(&inner.lanes[lane].counts.taken);
+        }
+        let lane = inner.last.take()?;
+        inner.lanes[lane].read()
+    }
+
+    /// A copy of the newest message; nothing when none has come since the last call.
+    pub fn latest(&mut self) -> Option<T>
+    where
+        T: Message<Element = NoElement>,
+    {
+        self.newest().map(|received| *received)
+    }
+
+    /// Whether a message waits.
+    pub fn has_message(&self) -> bool {
+        self.core.as_ref().is_some_and(|core| core.has_message())
+    }
+
+    pub(crate) fn set_core(&mut self, core: Option<Arc<InputCore<T>>>) {
+        self.core = core;
+    }
+
+    /// Whether any wire leads here.
+    pub fn is_wired(&self) -> bool {
+        self.core.as_ref().is_some_and(|core| !core.inner().lanes.is_empty())
+    }
+
+    /// The value at a time, looked up in the memory of the first output wired here that keeps one: between two messages or
+    /// beyond the last where the type says how, else the nearest.
+    pub fn at(&self, time: Time) -> Option<Found<T>> {
+        self.core.as_ref()?.inner().lanes.iter().find_map(|lane| match &lane.source {
+            Source::Link(_, seat) => seat.at(time),
+            Source::Value(_) => None,
+        })
+    }
+}
+
+impl<T: Message> InputInner<T> {
+    /// The lane whose front is next, staged and marked as given.
+    #[inline]
+    fn next(&mut self) -> Option<usize> {
+        if let [lane] = &mut self.lanes[..] {
+            let given = core::mem::take(&mut lane.staged) || lane.source.advance();
+            return given.then_some(0);
+        }
+        let mut best: Option<usize> = None;
+        for i in 0..self.lanes.len() {
+            let lane = &mut self.lanes[i];
+            lane.staged = lane.staged || lane.source.advance();
+            if lane.staged
+                && best.is_none_or(|best| {
+                    before(self.lanes[i].source.header(), self.lanes[best].source.header())
+                })
+            {
+                best = Some(i);
+            }
+        }
+        self.lanes[best?].staged = false;
+        best
+    }
+}
+
+/// Whether a message with the header `a` is to be taken before one with the header `b`.
+fn before(a: &Header, b: &Header) -> bool {
+    (core::cmp::Reverse(a.priority), a.stamp, a.sender, a.sequence)
+        < (core::cmp::Reverse(b.priority), b.stamp, b.sender, b.sequence)
+}
+
+impl<T: Message> Lane<T> {
+    /// What was taken last, read in place and counted.
+    fn current(&self) -> Option<Received<'_, T>> {
+        let received = self.read();
+        count(if received.is_some() { &self.counts.taken } else { &self.counts.expired });
+        received
+    }
+
+    fn read(&self) -> Option<Received<'_, T>> {
+        match &self.source {
+            Source::Value(receiver) => {
+                let parcel = receiver.current();
+                Some(Received { header: &parcel.header, place: Place::Value(&parcel.payload) })
+            }
+            Source::Link(receiver, seat) => {
+                let parcel = receiver.current();
+                let pin = seat.pin(parcel.payload)?;
+                Some(Received { header: &parcel.header, place: Place::Pinned(pin) })
+            }
+        }
+    }
+}
+
+/// Makes the mailbox of an input of type `T`.
+pub(crate) fn input_core<T: Message>() -> Arc<InputCore<T>> {
+    Arc::new(InputCore { inner: UnsafeCell::new(InputInner { lanes: Vec::new(), taken: 0, last: None }) })
+}
+
+impl<T: Message> Port for Input<T> {
+    fn shape(&self) -> PortShape {
+        PortShape { direction: Direction::Input, input: Some(MessageType::of::<T>()), output: None }
+    }
+
+    fn create(&self, _: &PortOptions, _: usize) -> PortEnds {
+        PortEnds { input: Some(input_core::<T>()), output: None }
+    }
+
+    fn bind(&mut self, ends: &PortEnds) {
+        self.core = ends.input.as_ref().and_then(downcast_input);
+    }
+}
+
+pub(crate) fn downcast_input<T: Message>(end: &Arc<dyn InputEnd>) -> Option<Arc<InputCore<T>>> {
+    let any: Arc<dyn Any + Send + Sync> = end.clone();
+    any.downcast().ok()
+}

@@ -1,0 +1,559 @@
+//! Where messages go out: the routes, and the agent's handle on them.
+
+#![allow(unsafe_code)]
+
+use core::sync::atomic::{AtomicU64, Ordering};
+use std::any::Any;
+use std::cell::UnsafeCell;
+use std::sync::Arc;
+
+use types::cdr::NoElement;
+use types::message::is_large;
+use types::{AgentId, Category, Filter, Header, Message, Priority, Time};
+
+use super::input::{Lane, NewLanes, Source};
+use super::{
+    Direction, NoSeat, OutputEnd, OutputFault, Parcel, Port, PortEnds, PortOptions, PortShape, PreparedWire,
+    Target, WireCounts, WireId, WireSpec, count,
+};
+use crate::context::current;
+use crate::memory::{self, Link, Seat};
+use crate::message_type::{self, MessageType};
+use crate::ring::{self, Overload, Pushed};
+
+/// The sending ends of a wire: a ring for each priority that the output uses.
+struct Route<T: Message> {
+    wire: WireId,
+    filter: Filter,
+    passed: u32,
+    overload: Overload,
+    values: Vec<(Priority, ring::Sender<Parcel<T>>)>,
+    links: Vec<(Priority, ring::Sender<Parcel<Link>>)>,
+    target: Target,
+    counts: Arc<WireCounts>,
+}
+
+struct NewRoute<T: Message> {
+    route: Option<Route<T>>,
+    room: Vec<Route<T>>,
+}
+
+struct OutputInner<T: Message> {
+    sender: AgentId,
+    sequence: u64,
+    routes: Vec<Route<T>>,
+    memory: Option<memory::Writer<T>>,
+    stuck: Option<(T, Vec<T::Element>)>,
+}
+
+/// The routes behind an output.
+pub(crate) struct OutputCore<T: Message> {
+    inner: UnsafeCell<OutputInner<T>>,
+    log_number: AtomicU64,
+    log_every: AtomicU64,
+    fault: AtomicU64,
+    sent: AtomicU64,
+}
+
+// SAFETY: as for `InputCore`: routes are touched only by the thread that runs the executor.
+unsafe impl<T: Message> Sync for OutputCore<T> {}
+// SAFETY: messages are plain data.
+unsafe impl<T: Message> Send for OutputCore<T> {}
+
+impl<T: Message> OutputCore<T> {
+    #[allow(clippy::mut_from_ref)]
+    #[inline]
+    fn inner(&self) -> &mut OutputInner<T> {
+        // SAFETY: see `Sync`.
+        unsafe { &mut *self.inner.get() }
+    }
+}
+
+impl<T: Message> OutputEnd for OutputCore<T> {
+    fn message_type(&self) -> &'static MessageType {
+        MessageType::of::<T>()
+    }
+
+    fn prepare(
+        &self,
+        spec: &WireSpec,
+        priorities: &[Priority],
+        routes: usize,
+        lanes: usize,
+    ) -> Result<PreparedWire, NoSeat> {
+        // The memory itself is never replaced, and sharing it is not touching it.
+        let shared = self.inner().memory.as_ref().map(|memory| (memory.shared(), memory.seats()));
+        if let Some((_, seats)) = &shared
+            && routes >= *seats
+        {
+            return Err(NoSeat { seats: *seats });
+        }
+        let displaces = spec.overload == Overload::NewestWins;
+        let (mut values, mut links, mut new_lanes) = (Vec::new(), Vec::new(), Vec::new());
+        for priority in priorities {
+            let source = match &shared {
+                None => {
+                    let (sender, receiver) = ring::ring(spec.depth, displaces);
+                    values.push((*priority, sender));
+                    Source::Value(receiver)
+                }
+                Some((memory, _)) => {
+                    let (sender, receiver) = ring::ring(spec.depth, displaces);
+                    links.push((*priority, sender));
+                    Source::Link(receiver, Seat::new(memory.clone()))
+                }
+            };
+            new_lanes.push(Lane { wire: spec.id, source, counts: spec.counts.clone(), staged: false });
+        }
+        let room = Vec::with_capacity(lanes + new_lanes.len());
+        let lanes = Box::new(NewLanes { lanes: new_lanes, room });
+        let route = Route {
+            wire: spec.id,
+            filter: spec.filter,
+            passed: 0,
+            overload: spec.overload,
+            values,
+            links,
+            target: spec.target.clone(),
+            counts: spec.counts.clone(),
+        };
+        let route = Box::new(NewRoute { route: Some(route), room: Vec::with_capacity(routes + 1) });
+        Ok(PreparedWire { route, lanes })
+    }
+
+    fn set_sender(&self, sender: AgentId) {
+        self.inner().sender = sender;
+    }
+
+    fn add_route(&self, route: &mut (dyn Any + Send)) {
+        let Some(new) = route.downcast_mut::<NewRoute<T>>() else { return };
+        let inner = self.inner();
+        if inner.routes.capacity() == inner.routes.len() {
+            new.room.append(&mut inner.routes);
+            core::mem::swap(&mut new.room, &mut inner.routes);
+        }
+        inner.routes.extend(new.route.take());
+    }
+
+    fn forget(&self, wire: WireId, into: &mut (dyn Any + Send)) {
+        let Some(into) = into.downcast_mut::<Option<Route<T>>>() else { return };
+        let routes = &mut self.inner().routes;
+        if let Some(at) = routes.iter().position(|route| route.wire == wire) {
+            *into = Some(routes.remove(at));
+        }
+    }
+
+    fn forgetting_box(&self) -> Box<dyn Any + Send> {
+        Box::new(None::<Route<T>>)
+    }
+
+    fn set_log(&self, number: u32, every: u32) {
+        self.log_number.store(number.into(), Ordering::Relaxed);
+        self.log_every.store(every.into(), Ordering::Relaxed);
+    }
+
+    fn sent(&self) -> u64 {
+        self.sent.load(Ordering::Relaxed)
+    }
+
+    fn set_fault(&self, fault: OutputFault) {
+        self.fault.store(fault as u64, Ordering::Relaxed);
+    }
+
+    fn send_encoded(&self, bytes: &[u8]) -> Result<(), types::cdr::Error> {
+        let (head, row) = message_type::decode::<T>(bytes)?;
+        self.send(&Envelope::default(), |place, room| {
+            *place = head;
+            let len = row.len().min(room.len());
+            room[..len].copy_from_slice(&row[..len]);
+            len
+        });
+        Ok(())
+    }
+}
+
+/// What a sender can say of a message; the rest of the header is filled in.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Envelope {
+    /// The time that the message speaks of; by default that of the step.
+    pub stamp: Option<Time>,
+    /// Until when it is of use.
+    pub deadline: Time,
+    /// Whom it is for.
+    pub recipient: AgentId,
+    /// Free for the agents' own use.
+    pub marker: u32,
+    /// What sort of thing it is.
+    pub category: Category,
+    /// How urgent it is; one of those that the output declares.
+    pub priority: Priority,
+}
+
+impl Default for Envelope {
+    fn default() -> Envelope {
+        Envelope {
+            stamp: None,
+            deadline: Time::NEVER,
+            recipient: AgentId::NONE,
+            marker: 0,
+            category: Category::Data,
+            priority: Priority::Normal,
+        }
+    }
+}
+
+/// What became of a message, wire by wire.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Sent {
+    /// Wires that took it.
+    pub taken: u32,
+    /// Wires that gave it back because they were full.
+    pub refused: u32,
+}
+
+/// An end where messages of type `T` go out.
+pub struct Output<T: Message> {
+    core: Option<Arc<OutputCore<T>>>,
+}
+
+impl<T: Message> Default for Output<T> {
+    fn default() -> Output<T> {
+        Output { core: None }
+    }
+}
+
+impl<T: Message> Output<T> {
+    /// Sends a small message to everybody who is wired to this output.
+    #[inline]
+    pub fn send(&mut self, message: T) -> Sent
+    where
+        T: Message<Element = NoElement>,
+    {
+        self.send_as(Envelope::default(), message)
+    }
+
+    /// Sends a small message with an envelope of its own.
+    #[inline]
+    pub fn send_as(&mut self, envelope: Envelope, message: T) -> Sent
+    where
+        T: Message<Element = NoElement>,
+    {
+        self.fill_as(envelope, |place, _| {
+            *place = message;
+            0
+        })
+    }
+
+    /// Sends a message that is filled in place. `fill` gets the head and the whole room for the row, and says how much of the
+    /// row is in use. What was in the place before is some earlier message, or the default.
+    #[inline]
+    pub fn send_with(&mut self, fill: impl FnOnce(&mut T, &mut [T::Element]) -> usize) -> Sent {
+        self.fill_as(Envelope::default(), fill)
+    }
+
+    /// The same with an envelope of its own.
+    #[inline]
+    pub fn fill_as(
+        &mut self,
+        envelope: Envelope,
+        fill: impl FnOnce(&mut T, &mut [T::Element]) -> usize,
+    ) -> Sent {
+        self.core.as_ref().map_or(Sent::default(), |core| core.send(&envelope, fill))
+    }
+
+    /// Sends as many of the messages as have room on every wire, in order, and gives back those that were not sent.
+    pub fn send_all<'a>(&mut self, messages: &'a [T]) -> &'a [T]
+    where
+        T: Message<Element = NoElement>,
+    {
+        let mut rest = messages;
+        while let Some((first, behind)) = rest.split_first() {
+            if !self.has_room() {
+                break;
+            }
+            self.send(*first);
+            rest = behind;
+        }
+        rest
+    }
+
+    /// Whether every wire has room for a message of normal priority without losing another.
+    pub fn has_room(&self) -> bool {
+        self.core.as_ref().is_none_or(|core| {
+            core.inner().routes.iter().all(|route| {
+                route.values.iter().all(|(_, ring)| ring.has_room())
+                    && route.links.iter().all(|(_, ring)| ring.has_room())
+            })
+        })
+    }
+
+    /// Whether anybody listens: a wire, or the log. What nobody hears need not be computed.
+    #[inline]
+    pub fn has_listeners(&self) -> bool {
+        self.core.as_ref().is_some_and(|core| {
+            !core.inner().routes.is_empty() || core.log_every.load(Ordering::Relaxed) == 1
+        })
+    }
+
+    pub(crate) fn set_core(&mut self, core: Option<Arc<OutputCore<T>>>) {
+        self.core = core;
+    }
+
+    /// The greatest length of the row of a message.
+    pub fn row_capacity(&self) -> usize {
+        self.core
+            .as_ref()
+            .and_then(|core| core.inner().memory.as_ref().map(memory::Writer::rows))
+            .unwrap_or(0)
+    }
+}
+
+impl<T: Message> OutputCore<T> {
+    #[inline]
+    fn send(&self, envelope: &Envelope, fill: impl FnOnce(&mut T, &mut [T::Element]) -> usize) -> Sent {
+        let inner = self.inner();
+        let now = current(|context| context.now()).unwrap_or(Time::ZERO);
+        let header = Header {
+            stamp: envelope.stamp.unwrap_or(now),
+            sequence: inner.sequence,
+            deadline: envelope.deadline,
+            sender: inner.sender,
+            recipient: envelope.recipient,
+            marker: envelope.marker,
+            category: envelope.category,
+            priority: envelope.priority,
+        };
+        inner.sequence += 1;
+        self.sent.store(inner.sequence, Ordering::Relaxed);
+        if self.fault.load(Ordering::Relaxed) != OutputFault::None as u64 {
+            return self.send_faulty(inner, &header, fill);
+        }
+        match &mut inner.memory {
+            Some(_) => self.send_link(inner, &header, fill),
+            None => self.send_value(inner, &header, fill),
+        }
+    }
+
+    #[inline]
+    fn logs(&self, sequence: u64) -> bool {
+        match self.log_every.load(Ordering::Relaxed) {
+            0 => false,
+            1 => true,
+            every => sequence.is_multiple_of(every),
+        }
+    }
+
+    fn log(&self, header: &Header, head: &T, row: &[T::Element]) {
+        if self.logs(header.sequence) {
+            let number = self.log_number.load(Ordering::Relaxed) as u32;
+            current(|context| context.log(|log| log.message(number, header, head, row)));
+        }
+    }
+
+    #[inline]
+    fn send_value(
+        &self,
+        inner: &mut OutputInner<T>,
+        header: &Header,
+        fill: impl FnOnce(&mut T, &mut [T::Element]) -> usize,
+    ) -> Sent {
+        let mut sent = Sent::default();
+        if let [route] = &mut inner.routes[..]
+            && !self.logs(header.sequence)
+            && route.lets_pass(header)
+        {
+            // The one wire: filled in place.
+            route.put_value(
+                header,
+                |place| {
+                    fill(place, &mut []);
+                },
+                &mut sent,
+            );
+            return sent;
+        }
+        let mut message = T::default();
+        fill(&mut message, &mut []);
+        self.log(header, &message, &[]);
+        for route in &mut inner.routes {
+            if route.lets_pass(header) {
+                route.put_value(header, |place| *place = message, &mut sent);
+            }
+        }
+        sent
+    }
+
+    fn send_link(
+        &self,
+        inner: &mut OutputInner<T>,
+        header: &Header,
+        fill: impl FnOnce(&mut T, &mut [T::Element]) -> usize,
+    ) -> Sent {
+        let mut sent = Sent::default();
+        let Some(mut loan) = inner.memory.as_mut().and_then(memory::Writer::loan) else {
+            return sent;
+        };
+        let (head, row) = loan.parts();
+        let len = fill(head, row).min(row.len());
+        self.log(header, head, &row[..len]);
+        let link = loan.publish(*header, len);
+        for route in &mut inner.routes {
+            if route.lets_pass(header) {
+                route.put_link(header, link, &mut sent);
+            }
+        }
+        sent
+    }
+
+    /// The slow way of an output that was made to misbehave.
+    #[cold]
+    fn send_faulty(
+        &self,
+        inner: &mut OutputInner<T>,
+        header: &Header,
+        fill: impl FnOnce(&mut T, &mut [T::Element]) -> usize,
+    ) -> Sent {
+        let fault = self.fault.load(Ordering::Relaxed);
+        // A pure function of the message's number: the same run misbehaves in the same way.
+        let chance = types::chance::uniform(0x0fa1_17ed, u64::from(inner.sender.0), header.sequence);
+        if fault == OutputFault::Off as u64 || (fault == OutputFault::Intermittent as u64 && chance < 0.5) {
+            return Sent::default();
+        }
+        let rows = inner.memory.as_ref().map_or(0, memory::Writer::rows);
+        let mut head = T::default();
+        let mut row = vec![T::Element::default(); rows];
+        let len = fill(&mut head, &mut row).min(rows);
+        row.truncate(len);
+        if fault == OutputFault::Stuck as u64 {
+            let (stuck_head, stuck_row) = inner.stuck.get_or_insert((head, row));
+            (head, row) = (*stuck_head, stuck_row.clone());
+        } else if fault == OutputFault::Garbage as u64 || fault == OutputFault::Wrong as u64 {
+            let wild = fault == OutputFault::Garbage as u64;
+            let mut draws = 0;
+            head.disturb(&mut row, wild, &mut || {
+                draws += 1;
+                types::chance::uniform(0x0fa1_17ed, u64::from(inner.sender.0) << 32 | draws, header.sequence)
+            });
+        }
+        let put = |place: &mut T, room: &mut [T::Element]| {
+            *place = head;
+            let len = row.len().min(room.len());
+            room[..len].copy_from_slice(&row[..len]);
+            len
+        };
+        if inner.memory.is_some() {
+            self.send_link(inner, header, put)
+        } else {
+            self.send_value(inner, header, put)
+        }
+    }
+}
+
+impl<T: Message> Route<T> {
+    #[inline]
+    fn lets_pass(&mut self, header: &Header) -> bool {
+        if !self.filter.passes(header) {
+            return false;
+        }
+        if self.filter.every > 1 {
+            self.passed = (self.passed + 1) % self.filter.every;
+            return self.passed == 1;
+        }
+        true
+    }
+
+    #[inline]
+    fn put_value(&mut self, header: &Header, fill: impl FnOnce(&mut T), sent: &mut Sent) {
+        let pushed = match lane_for(&mut self.values, header.priority) {
+            Some(ring) => ring.push(|parcel| {
+                parcel.header = *header;
+                fill(&mut parcel.payload);
+            }),
+            None => Pushed::Full,
+        };
+        self.account(pushed, sent);
+    }
+
+    fn put_link(&mut self, header: &Header, link: Link, sent: &mut Sent) {
+        let pushed = match lane_for(&mut self.links, header.priority) {
+            Some(ring) => ring.push(|parcel| *parcel = Parcel { header: *header, payload: link }),
+            None => Pushed::Full,
+        };
+        self.account(pushed, sent);
+    }
+
+    #[inline]
+    fn account(&mut self, pushed: Pushed, sent: &mut Sent) {
+        match pushed {
+            Pushed::Full if self.overload == Overload::Refuse => {
+                count(&self.counts.refused);
+                sent.refused += 1;
+                return;
+            }
+            Pushed::Full => {
+                count(&self.counts.dropped);
+                return;
+            }
+            Pushed::Displaced => count(&self.counts.dropped),
+            Pushed::Stored => {}
+        }
+        count(&self.counts.sent);
+        sent.taken += 1;
+        if self.target.wakes {
+            let target = &self.target;
+            current(|context| context.wake(target.executor, target.slot, &target.door));
+        }
+    }
+}
+
+/// The ring for a priority: its own, or the next lower one that the output declares, or the lowest.
+#[inline]
+fn lane_for<P>(
+    lanes: &mut [(Priority, ring::Sender<Parcel<P>>)],
+    priority: Priority,
+) -> Option<&mut ring::Sender<Parcel<P>>> {
+    if let [(_, only)] = lanes {
+        return Some(only);
+    }
+    let at = lanes.iter().position(|(lane, _)| *lane <= priority).unwrap_or(lanes.len().checked_sub(1)?);
+    Some(&mut lanes[at].1)
+}
+
+/// Makes what stands behind an output of type `T`.
+pub(crate) fn output_core<T: Message>(options: &PortOptions, seats: usize) -> Arc<OutputCore<T>> {
+    let large = is_large::<T>();
+    let history = if large { options.history.max(4) } else { options.history };
+    let memory = (history > 0).then(|| memory::memory(memory::Form { history, seats, rows: options.rows }));
+    Arc::new(OutputCore {
+        inner: UnsafeCell::new(OutputInner {
+            sender: AgentId::NONE,
+            sequence: 0,
+            routes: Vec::new(),
+            memory,
+            stuck: None,
+        }),
+        log_number: AtomicU64::new(u64::from(u32::MAX)),
+        log_every: AtomicU64::new(0),
+        fault: AtomicU64::new(0),
+        sent: AtomicU64::new(0),
+    })
+}
+
+impl<T: Message> Port for Output<T> {
+    fn shape(&self) -> PortShape {
+        PortShape { direction: Direction::Output, input: None, output: Some(MessageType::of::<T>()) }
+    }
+
+    fn create(&self, options: &PortOptions, seats: usize) -> PortEnds {
+        PortEnds { input: None, output: Some(output_core::<T>(options, seats)) }
+    }
+
+    fn bind(&mut self, ends: &PortEnds) {
+        self.core = ends.output.as_ref().and_then(downcast_output);
+    }
+}
+
+pub(crate) fn downcast_output<T: Message>(end: &Arc<dyn OutputEnd>) -> Option<Arc<OutputCore<T>>> {
+    let any: Arc<dyn Any + Send + Sync> = end.clone();
+    any.downcast().ok()
+}

@@ -1,0 +1,80 @@
+//! What a running system says of itself.
+
+use core::sync::atomic::Ordering::Relaxed;
+
+use types::{Duration, Time};
+
+use super::{Known, Router, Wire};
+use crate::request::{AgentView, Counts, PortView, SystemView, WireView};
+
+impl Router {
+    /// What there is, as people ask for it.
+    pub(crate) fn view(&self, now: Time) -> SystemView {
+        let agents = self.agents.iter().map(|known| self.view_agent(known)).collect();
+        let wires =
+            self.wires.iter().filter(|wire| !wire.is_answer).map(|wire| self.view_wire(wire)).collect();
+        SystemView { name: self.name.clone(), now, agents, wires }
+    }
+
+    pub(super) fn view_agent(&self, known: &Known) -> AgentView {
+        let stats = &known.stats;
+        let executor = &self.executors[known.executor];
+        let ports = known.kind.ports.iter().zip(&known.ends).map(|(port, end)| PortView {
+            name: port.name,
+            doc: port.doc,
+            direction: port.shape.direction,
+            message: port.shape.input.or(port.shape.output).map_or("", |message| message.short_name()),
+            sent: end.output.as_ref().map_or(0, |output| output.sent()),
+        });
+        AgentView {
+            id: known.id,
+            name: known.plan.name.clone(),
+            kind: known.kind.kind,
+            doc: known.kind.doc,
+            executor: executor.plan.name.clone(),
+            asked: executor.plan.priority.map_or("ordinary".into(), |priority| format!("fifo {priority}")),
+            granted: executor.granted.clone(),
+            state: known.state,
+            last_death: known.last_death.clone(),
+            period: (known.timing.period > Duration::ZERO).then_some(known.timing.period),
+            deadline: known.timing.deadline,
+            params: known.params.clone(),
+            fields: known.kind.params.clone(),
+            ports: ports.collect(),
+            counts: Counts {
+                releases: stats.releases.load(Relaxed),
+                missed: stats.missed.load(Relaxed),
+                stalled: stats.stalled.load(Relaxed),
+                skipped: stats.skipped.load(Relaxed),
+                faults: stats.faults.load(Relaxed),
+                panics: stats.panics.load(Relaxed),
+                hangs: stats.hangs.load(Relaxed),
+                restarts: stats.restarts.load(Relaxed),
+            },
+            exec: stats.exec.figure(),
+            jitter: stats.jitter.figure(),
+            response: stats.response.figure(),
+        }
+    }
+
+    fn view_wire(&self, wire: &Wire) -> WireView {
+        let plan = self.plan_of(wire);
+        let message = self
+            .by_id(wire.from.0)
+            .and_then(|known| known.ends[wire.from.1].output.as_ref())
+            .map_or("", |end| end.message_type().short_name());
+        WireView {
+            from: plan.from,
+            to: plan.to,
+            message,
+            depth: wire.depth,
+            overload: wire.overload,
+            filter: wire.filter,
+            sent: wire.counts.sent.load(Relaxed),
+            dropped: wire.counts.dropped.load(Relaxed),
+            refused: wire.counts.refused.load(Relaxed),
+            taken: wire.counts.taken.load(Relaxed),
+            expired: wire.counts.expired.load(Relaxed),
+        }
+    }
+}

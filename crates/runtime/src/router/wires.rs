@@ -1,0 +1,224 @@
+//! Making and cutting wires.
+
+use std::sync::Arc;
+
+use types::{AgentId, Filter, Priority};
+
+use super::{Fabric, Reply, Router, Wire};
+use crate::executor::Change;
+use crate::plan::{USUAL_DEPTH, USUAL_DEPTH_ON, WirePlan};
+use crate::port::{Direction, InputEnd, NoSeat, PortEnds, Target, WireCounts, WireId, WireSpec};
+use crate::request::Refusal;
+use crate::ring::Overload;
+use crate::service::answers_for;
+
+impl Router {
+    pub(super) fn find_wire(&self, from: &str, to: &str) -> Option<&Wire> {
+        let (from, to) = (self.port(from).ok()?, self.port(to).ok()?);
+        let (from, to) = ((self.agents[from.0].id, from.1), (self.agents[to.0].id, to.1));
+        self.wires.iter().find(|wire| wire.from == from && wire.to == to && !wire.is_answer)
+    }
+
+    pub(super) fn plan_of(&self, wire: &Wire) -> WirePlan {
+        let name = |(id, port): (AgentId, usize)| {
+            self.by_id(id).map_or_else(String::new, |known| {
+                format!("{}.{}", known.plan.name, known.kind.ports[port].name)
+            })
+        };
+        let mut plan = WirePlan::new(name(wire.from), name(wire.to));
+        (plan.depth, plan.overload, plan.filter) = (Some(wire.depth), Some(wire.overload), wire.filter);
+        plan
+    }
+
+    /// Makes a wire.
+    pub(crate) fn wire(&mut self, plan: &WirePlan, fabric: &mut dyn Fabric) -> Reply<()> {
+        let (from, to) = (self.port(&plan.from)?, self.port(&plan.to)?);
+        if self.find_wire(&plan.from, &plan.to).is_some() {
+            return Err(Refusal::new(format!("{} is already wired to {}", plan.from, plan.to)));
+        }
+        let (out_port, in_port) =
+            (&self.agents[from.0].kind.ports[from.1], &self.agents[to.0].kind.ports[to.1]);
+        match (out_port.shape.direction, in_port.shape.direction) {
+            (Direction::Output, Direction::Input) => {
+                self.check_types(plan, from, to)?;
+                self.join(from, to, plan, plan.filter, false, fabric).map(drop)
+            }
+            (Direction::Client, Direction::Service) => {
+                self.check_types(plan, from, to)?;
+                self.check_types(plan, to, from)?;
+                let filter = answers_for(self.agents[from.0].id);
+                let answers = self.join(to, from, plan, filter, true, fabric)?;
+                let calls = self.join(from, to, plan, plan.filter, false, fabric)?;
+                if let Some(wire) = self.wires.iter_mut().find(|wire| wire.id == calls) {
+                    wire.partner = Some(answers);
+                }
+                Ok(())
+            }
+            (Direction::Input, Direction::Output) | (Direction::Service, Direction::Client) => {
+                Err(Refusal::new(format!("{} and {} are the wrong way round", plan.from, plan.to))
+                    .help(format!("\"{}\" = [\"{}\"]", plan.to, plan.from)))
+            }
+            (a, b) => {
+                Err(Refusal::new(format!("{} is an {}, {} an {}", plan.from, a.name(), plan.to, b.name()))
+                    .help("a wire leads from an output to an input, or from a client to a service"))
+            }
+        }
+    }
+
+    fn check_types(&self, plan: &WirePlan, from: (usize, usize), to: (usize, usize)) -> Reply<()> {
+        let out = self.agents[from.0].ends[from.1].output.as_ref().map(|end| end.message_type());
+        let into = self.agents[to.0].ends[to.1].input.as_ref().map(|end| end.message_type());
+        match (out, into) {
+            (Some(out), Some(into)) if out == into => Ok(()),
+            (Some(out), Some(into)) => {
+                let fits: Vec<String> = self.agents[from.0]
+                    .kind
+                    .ports
+                    .iter()
+                    .filter(|port| port.shape.output == Some(into))
+                    .map(|port| format!("{}.{}", self.agents[from.0].plan.name, port.name))
+                    .collect();
+                let refusal = Refusal::new(format!(
+                    "{} sends {}, {} takes {}",
+                    plan.from,
+                    out.short_name(),
+                    plan.to,
+                    into.short_name()
+                ));
+                Err(if fits.is_empty() {
+                    refusal
+                } else {
+                    refusal.help(format!("did you mean {}?", fits.join(" or ")))
+                })
+            }
+            _ => Err(Refusal::new(format!("{} cannot be wired to {}", plan.from, plan.to))),
+        }
+    }
+
+    /// Makes one ring wire: the receiver joins, then the sender adds.
+    fn join(
+        &mut self,
+        from: (usize, usize),
+        to: (usize, usize),
+        plan: &WirePlan,
+        filter: Filter,
+        is_answer: bool,
+        fabric: &mut dyn Fabric,
+    ) -> Reply<WireId> {
+        let (sender, receiver) = (&self.agents[from.0], &self.agents[to.0]);
+        let (Some(output), Some(input)) =
+            (sender.ends[from.1].output.clone(), receiver.ends[to.1].input.clone())
+        else {
+            return Err(Refusal::new(format!("{} cannot be wired to {}", plan.from, plan.to)));
+        };
+        let port = &receiver.kind.ports[to.1];
+        let answers = port.shape.direction == Direction::Client;
+        let wakes = answers || receiver.plan.on.iter().any(|on| on == port.name);
+        let depth = plan.depth.unwrap_or(if wakes { USUAL_DEPTH_ON } else { USUAL_DEPTH });
+        let overload = plan.overload.unwrap_or(if wakes { Overload::Refuse } else { Overload::NewestWins });
+        if depth == 0 || depth > crate::ring::MOST_MESSAGES {
+            let most = crate::ring::MOST_MESSAGES;
+            return Err(Refusal::new(format!("a wire holds from 1 to {most} messages, not {depth}")));
+        }
+        let target = Target {
+            executor: receiver.executor as u32,
+            slot: receiver.slot,
+            door: self.executors[receiver.executor].link.door.clone(),
+            wakes,
+        };
+        let id = WireId(self.next_wire);
+        let counts = Arc::new(WireCounts::default());
+        let spec = WireSpec { id, depth, overload, filter, target, counts: counts.clone() };
+        let mut priorities: Vec<Priority> = sender.kind.ports[from.1].options.priorities().collect();
+        priorities.sort_unstable_by(|a, b| b.cmp(a));
+        if priorities.is_empty() {
+            priorities.push(Priority::Normal);
+        }
+        let (from_id, to_id) = ((sender.id, from.1), (receiver.id, to.1));
+        let routes = self.wires.iter().filter(|wire| wire.from == from_id).count();
+        let lanes = self.wires.iter().filter(|wire| wire.to == to_id).count() * Priority::ALL.len();
+        let prepared = output.prepare(&spec, &priorities, routes, lanes).map_err(|NoSeat { seats }| {
+            Refusal::new(format!("{} has readers on all {seats} seats of its memory", plan.from))
+        })?;
+        let (sender_executor, receiver_executor, slot) = (sender.executor, receiver.executor, receiver.slot);
+        self.next_wire += 1;
+        self.commit(receiver_executor, Change::Join { end: input, lanes: prepared.lanes, slot }, fabric)?;
+        self.commit(sender_executor, Change::Route { end: output, route: prepared.route }, fabric)?;
+        self.wires.push(Wire {
+            id,
+            from: from_id,
+            to: to_id,
+            partner: None,
+            is_answer,
+            depth,
+            overload,
+            filter,
+            counts,
+        });
+        if sender_executor == receiver_executor && wakes {
+            self.commit_order(sender_executor, fabric)?;
+        }
+        Ok(id)
+    }
+
+    pub(super) fn unwire(&mut self, from: &str, to: &str, fabric: &mut dyn Fabric) -> Reply<()> {
+        self.port(from)?;
+        self.port(to)?;
+        let Some(wire) = self.find_wire(from, to) else {
+            let ends = self.port(from)?;
+            let id = (self.agents[ends.0].id, ends.1);
+            let known: Vec<String> =
+                self.wires.iter().filter(|wire| wire.from == id).map(|w| self.plan_of(w).to).collect();
+            let refusal = Refusal::new(format!("{from} is not wired to {to}"));
+            return Err(if known.is_empty() {
+                refusal
+            } else {
+                refusal.help(format!("it is wired to {}", known.join(", ")))
+            });
+        };
+        let (id, partner) = (wire.id, wire.partner);
+        self.cut(id, false, fabric)?;
+        partner.map_or(Ok(()), |partner| self.cut(partner, false, fabric))
+    }
+
+    /// Cuts one ring wire: the sender forgets, then the receiver leaves, when it is drained unless that is not waited for.
+    pub(super) fn cut(&mut self, id: WireId, force: bool, fabric: &mut dyn Fabric) -> Reply<()> {
+        let Some(wire) = self.wires.iter().find(|wire| wire.id == id) else { return Ok(()) };
+        let (from, to) = (wire.from, wire.to);
+        let end =
+            |id: AgentId, port: usize| self.by_id(id).map(|known| (known.executor, known.ends[port].clone()));
+        if let Some((executor, PortEnds { output: Some(end), .. })) = end(from.0, from.1) {
+            let into = end.forgetting_box();
+            self.commit(executor, Change::Forget { end, wire: id, into }, fabric)?;
+        }
+        let end =
+            |id: AgentId, port: usize| self.by_id(id).map(|known| (known.executor, known.ends[port].clone()));
+        if let Some((executor, PortEnds { input: Some(end), .. })) = end(to.0, to.1) {
+            self.leave(executor, end, id, force, fabric)?;
+        }
+        self.wires.retain(|wire| wire.id != id);
+        Ok(())
+    }
+
+    pub(super) fn leave(
+        &mut self,
+        executor: usize,
+        end: Arc<dyn InputEnd>,
+        wire: WireId,
+        force: bool,
+        fabric: &mut dyn Fabric,
+    ) -> Reply<()> {
+        // A receiver that takes nothing any more is not waited for: what lies in its mailbox is counted as dropped.
+        const PATIENCE: usize = 100;
+        for attempt in 0.. {
+            let into = end.leaving_box();
+            let change = Change::Leave { end: end.clone(), wire, into, force: force || attempt >= PATIENCE };
+            if self.commit_and_get(executor, change, fabric).is_ok_and(
+                |change| matches!(change, Change::Leave { force, .. } if force || attempt < PATIENCE),
+            ) {
+                return Ok(());
+            }
+        }
+        Ok(())
+    }
+}
