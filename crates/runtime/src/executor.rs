@@ -153,8 +153,7 @@ pub(crate) enum Change {
     /// Sends a message that comes from outside, on the thread that owns the routes.
     Send {
         end: Arc<dyn OutputEnd>,
-        bytes: Vec<u8>,
-        result: Option<Result<(), types::cdr::Error>>,
+        message: Box<dyn Any + Send>,
     },
     /// Ends all agents.
     Stop,
@@ -623,9 +622,9 @@ impl Core {
                     seat.fault = *fault;
                 }
             }
-            Change::Send { end, bytes, result } => {
+            Change::Send { end, message } => {
                 context.begin(AgentId::NONE, now, self.number, &*self.ready);
-                *result = Some(end.send_encoded(bytes));
+                end.send_prepared(message.as_ref());
                 context.end();
             }
             Change::Stop => {

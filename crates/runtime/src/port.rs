@@ -203,8 +203,10 @@ pub(crate) trait OutputEnd: Any + Send + Sync {
     fn sent(&self) -> u64;
     /// Makes the output misbehave, or behave again.
     fn set_fault(&self, fault: OutputFault);
-    /// Sends a message that is given in CDR.
-    fn send_encoded(&self, bytes: &[u8]) -> Result<(), types::cdr::Error>;
+    /// Reads a message from CDR, to be sent with [`send_prepared`](Self::send_prepared).
+    fn prepare_message(&self, bytes: &[u8]) -> Result<Box<dyn Any + Send>, types::cdr::Error>;
+    /// Sends a message that was prepared by an output of the same type.
+    fn send_prepared(&self, message: &(dyn Any + Send));
 }
 
 /// How an output misbehaves on request.

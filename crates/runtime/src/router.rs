@@ -179,7 +179,7 @@ impl Router {
             Request::Unwire { from, to } => self.unwire(&from, &to, fabric),
             Request::Set { agent, key, value } => self.set(&agent, &key, value, fabric),
             Request::Fault { target, fault } => self.fault(&target, fault, fabric),
-            Request::Send { port, cdr } => self.send(&port, cdr, fabric),
+            Request::Send { port, cdr } => self.send(&port, &cdr, fabric),
             Request::Quit => Ok(()),
             Request::All(requests) => self.apply_all(requests, now, fabric),
         }
@@ -601,7 +601,7 @@ impl Router {
         }
     }
 
-    fn send(&mut self, port: &str, bytes: Vec<u8>, fabric: &mut dyn Fabric) -> Reply<()> {
+    fn send(&mut self, port: &str, bytes: &[u8], fabric: &mut dyn Fabric) -> Reply<()> {
         let (agent, place) = self.port(port)?;
         let Some(end) = self.agents[agent].ends[place].output.clone() else {
             return Err(Refusal::new(format!("{port} takes messages but sends none")).help(
@@ -609,11 +609,8 @@ impl Router {
             ));
         };
         let executor = self.agents[agent].executor;
-        let done = self.commit_and_get(executor, Change::Send { end, bytes, result: None }, fabric)?;
-        match done {
-            Change::Send { result: Some(Err(error)), .. } => Err(Refusal::new(error.to_string())),
-            _ => Ok(()),
-        }
+        let message = end.prepare_message(bytes).map_err(|error| Refusal::new(error.to_string()))?;
+        self.commit(executor, Change::Send { end, message }, fabric)
     }
 
     /// Computes the data-flow order of an executor and gives it to it.

@@ -10,7 +10,6 @@
 use libm::{cos, round, sin, sqrt, tan};
 use types::{Point, Pose};
 
-use crate::chance::Stream;
 use crate::colour::Colour;
 use crate::field::Field;
 use crate::model::Camera;
@@ -20,6 +19,7 @@ use crate::plan::{Person, Thing};
 use crate::robot::{HeadState, Robot};
 use crate::shape::Circle;
 use crate::simulator::{RobotId, Simulator};
+use types::chance::Stream;
 
 /// Nothing beyond this depth is drawn (m).
 const FAR: f64 = 40.0;

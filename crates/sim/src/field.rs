@@ -478,7 +478,7 @@ pub(crate) enum Scatterer {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::chance::Stream;
+    use types::chance::Stream;
     use types::geometry::TAU;
 
     const NOBODY: u32 = u32::MAX;

@@ -4,9 +4,9 @@ use libm::{cos, sin};
 use types::geometry::TAU;
 use types::{Point, Pose};
 
-use crate::chance::Stream;
 use crate::field::Field;
 use crate::model::Laser;
+use types::chance::Stream;
 
 /// The angle of beam `k` to the left of straight ahead (rad).
 ///

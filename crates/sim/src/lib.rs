@@ -15,7 +15,6 @@
 #![forbid(unsafe_code)]
 
 pub mod camera;
-pub mod chance;
 pub mod colour;
 mod field;
 pub mod free_way;
@@ -33,7 +32,6 @@ pub mod snapshot;
 mod sonar;
 pub mod vary;
 
-pub use chance::Stream;
 pub use colour::Colour;
 pub use goal::{Goal, Progress};
 pub use model::Model;
@@ -42,4 +40,5 @@ pub use plan::WorldPlan;
 pub use read::read_pose;
 pub use robot::{CLEARANCE_LIMIT, Charge, HeadState, Truth};
 pub use simulator::{AddError, PHYSICS_STEP, RobotId, Simulator};
+pub use types::chance::Stream;
 pub use vary::{Drawn, Vary};

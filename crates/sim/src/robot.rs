@@ -4,10 +4,10 @@ use libm::{exp, fabs, floor, sqrt};
 use types::geometry::{PI, Pose, TAU, wrap};
 use types::{Point, Time};
 
-use crate::chance::Stream;
 use crate::field::Field;
 use crate::model::{Battery, Head, Model};
 use crate::sonar::Fan;
+use types::chance::Stream;
 
 /// The physics step (s).
 pub(crate) const STEP: f64 = 0.01;

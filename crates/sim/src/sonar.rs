@@ -7,9 +7,9 @@
 use libm::{cos, sin, sqrt, tan};
 use types::Point;
 
-use crate::chance::Stream;
 use crate::field::{Field, Met, Scatterer};
 use crate::model::Sonar;
+use types::chance::Stream;
 
 /// Rays of a fan. With 5° between them the range of a face errs by less than 0.1 %.
 const RAYS: usize = 7;

@@ -6,12 +6,12 @@ use types::geometry::{PI, Pose};
 use types::value::{Entry, Mistake, Span, Table, TableReader, Value};
 use types::{Point, geometry::TAU};
 
-use crate::chance::Stream;
 use crate::free_way;
 use crate::outline;
 use crate::plan::WorldPlan;
 use crate::read::read_pose;
 use crate::shape::{self, Segment};
+use types::chance::Stream;
 
 /// The way that must be free has this width (m): a robot of 0.45 m and 0.1 m on either side.
 pub const FREE_WIDTH: f64 = 0.65;

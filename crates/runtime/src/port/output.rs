@@ -8,6 +8,7 @@ use std::cell::UnsafeCell;
 use std::sync::Arc;
 
 use types::cdr::NoElement;
+use types::chance::Stream;
 use types::message::is_large;
 use types::{AgentId, Category, Filter, Header, Message, Priority, Time};
 
@@ -160,15 +161,18 @@ impl<T: Message> OutputEnd for OutputCore<T> {
         self.fault.store(fault as u64, Ordering::Relaxed);
     }
 
-    fn send_encoded(&self, bytes: &[u8]) -> Result<(), types::cdr::Error> {
-        let (head, row) = message_type::decode::<T>(bytes)?;
+    fn prepare_message(&self, bytes: &[u8]) -> Result<Box<dyn Any + Send>, types::cdr::Error> {
+        Ok(Box::new(message_type::decode::<T>(bytes)?))
+    }
+
+    fn send_prepared(&self, message: &(dyn Any + Send)) {
+        let Some((head, row)) = message.downcast_ref::<(T, Vec<T::Element>)>() else { return };
         self.send(&Envelope::default(), |place, room| {
-            *place = head;
+            *place = *head;
             let len = row.len().min(room.len());
             room[..len].copy_from_slice(&row[..len]);
             len
         });
-        Ok(())
     }
 }
 
@@ -415,8 +419,10 @@ impl<T: Message> OutputCore<T> {
     ) -> Sent {
         let fault = self.fault.load(Ordering::Relaxed);
         // A pure function of the message's number: the same run misbehaves in the same way.
-        let chance = types::chance::uniform(0x0fa1_17ed, u64::from(inner.sender.0), header.sequence);
-        if fault == OutputFault::Off as u64 || (fault == OutputFault::Intermittent as u64 && chance < 0.5) {
+        let draws = Stream::new(0, "output fault").sample(inner.sender.0.into()).sample(header.sequence);
+        if fault == OutputFault::Off as u64
+            || (fault == OutputFault::Intermittent as u64 && draws.uniform(0) < 0.5)
+        {
             return Sent::default();
         }
         let rows = inner.memory.as_ref().map_or(0, memory::Writer::rows);
@@ -429,10 +435,10 @@ impl<T: Message> OutputCore<T> {
             (head, row) = (*stuck_head, stuck_row.clone());
         } else if fault == OutputFault::Garbage as u64 || fault == OutputFault::Wrong as u64 {
             let wild = fault == OutputFault::Garbage as u64;
-            let mut draws = 0;
+            let mut number = 0;
             head.disturb(&mut row, wild, &mut || {
-                draws += 1;
-                types::chance::uniform(0x0fa1_17ed, u64::from(inner.sender.0) << 32 | draws, header.sequence)
+                number += 1;
+                draws.uniform(number)
             });
         }
         let put = |place: &mut T, room: &mut [T::Element]| {

@@ -445,8 +445,7 @@ fn two_runs_write_the_same_bytes() {
         let log = runtime::LogChoice::by(|_, _| 1);
         let options = Options { recorder: Some(Box::new(Written(bytes.clone()))), log, ..options(1000) };
         Simulation::new(&plan, &types(), options).unwrap().run().unwrap();
-        let bytes = bytes.lock().unwrap().clone();
-        bytes
+        bytes.lock().unwrap().clone()
     };
     let (a, b) = (run(), run());
     assert!(a.len() > 10_000);
