@@ -29,7 +29,7 @@ impl Time {
 
     /// Seconds since the start of the clock.
     pub fn seconds(self) -> f64 {
-        self.0 as f64 * 1e-9
+        self.0 as f64 / 1e9
     }
 
     /// The span from the start of the clock.
@@ -74,7 +74,7 @@ impl Duration {
 
     /// In seconds.
     pub fn seconds(self) -> f64 {
-        self.0 as f64 * 1e-9
+        self.0 as f64 / 1e9
     }
 }
 

@@ -1,0 +1,284 @@
+//! The drive: the agent in front of the wheels. What cannot or must not be driven does not pass.
+//!
+//! ```text
+//!  words, offers of people ─▶ fusion ─┐ while one holds
+//!  wish of the coordinator ───────────┴─▶ safety ─▶ limits ─▶ reflex ─▶ command ─▶ gate of the robot
+//! ```
+//!
+//! The order of authority is safety, then people, then the robot's own wishes. The gate behind it stands above all of them.
+
+use motion::fusion::{self, Cause, Held, Moment, Veto, fuse};
+use motion::kinematics::{Differential, is_finite};
+use motion::limits::{Cuts, Forward, Limits, limit};
+use runtime::{Agent, Fault, Input, Output, Step};
+use types::messages::{Odometry, Offer, Safety, Twist};
+use types::params::Params;
+use types::{Duration, Time};
+
+use crate::shared::{Dated, Offers};
+
+/// What the drive can do.
+#[derive(Clone, Debug, Params)]
+pub struct DriveParams {
+    /// Highest forward speed (m/s). 0.6 is a slow walk, so people can step aside.
+    #[param(default = 0.6, min = 0.0, max = 10.0)]
+    pub linear_max: f64,
+    /// Highest backward speed (m/s). 0.3: few robots see well behind.
+    #[param(default = 0.3, min = 0.0, max = 10.0)]
+    pub backward_max: f64,
+    /// Highest turn rate (rad/s). 1 turns around in three seconds and smears no picture.
+    #[param(default = 1.0, min = 0.0, max = 20.0)]
+    pub angular_max: f64,
+    /// Highest rate at which the speed may grow (m/s²). 0.5 starts without slip on a smooth floor.
+    #[param(default = 0.5, min = 0.01, max = 20.0)]
+    pub acceleration: f64,
+    /// Highest rate at which the speed may fall (m/s²). 1 does not tip a tall body; safety counts on it.
+    #[param(default = 1.0, min = 0.01, max = 20.0)]
+    pub deceleration: f64,
+    /// Highest rate at which the turn rate may change (rad/s²). 3 is at full turn rate after a third of a second.
+    #[param(default = 3.0, min = 0.01, max = 100.0)]
+    pub angular_acceleration: f64,
+    /// Radius of a wheel (m). 0.075 is that of the exploring robot.
+    #[param(default = 0.075, min = 0.005, max = 1.0)]
+    pub wheel_radius: f64,
+    /// From wheel to wheel (m). 0.36 is that of the exploring robot.
+    #[param(default = 0.36, min = 0.01, max = 3.0)]
+    pub track: f64,
+    /// Highest turn rate of a wheel (rad/s). 10 is what the motors of the exploring robot can do.
+    #[param(default = 10.0, min = 0.1, max = 1000.0)]
+    pub wheel_max: f64,
+    /// A wish older than this is standing still (time). 300 ms is six steps of a coordinator at 20 Hz.
+    #[param(default = Duration::millis(300), min = 0.01, max = 10.0)]
+    pub wish_age: Duration,
+    /// A verdict of the safety monitor older than this forbids to move forward (time). 700 ms is two missed readings of a sonar at 4 Hz.
+    #[param(default = Duration::millis(700), min = 0.01, max = 60.0)]
+    pub safety_age: Duration,
+    /// How long a reflex bounds the motion (time). 300 ms outlasts one period of a sonar at 4 Hz.
+    #[param(default = Duration::millis(300), min = 0.0, max = 10.0)]
+    pub reflex_hold: Duration,
+    /// Change of speed for the greatest "speed up" (m/s). 0.3: no one word takes it from rest to full speed.
+    #[param(default = 0.3, min = 0.0, max = 10.0)]
+    pub speed_change: f64,
+}
+
+impl DriveParams {
+    fn limits(&self) -> Limits {
+        Limits {
+            linear_max: self.linear_max,
+            backward_max: self.backward_max,
+            angular_max: self.angular_max,
+            acceleration: self.acceleration,
+            deceleration: self.deceleration,
+            angular_acceleration: self.angular_acceleration,
+            wheel_max: self.wheel_max,
+            drive: Differential::new(self.wheel_radius, self.track),
+        }
+    }
+
+    fn fusion(&self) -> fusion::Parameters {
+        fusion::Parameters {
+            linear_max: self.linear_max,
+            angular_max: self.angular_max,
+            speed_change: self.speed_change,
+            // An order of a person holds as long as the person said, and no longer.
+            hold: Duration::ZERO,
+            ..fusion::Parameters::default()
+        }
+    }
+}
+
+/// Passes to the wheels what they can do of what is wished: people before the robot's own wishes, safety before people, and a reflex
+/// that can only slow or stop.
+#[derive(Agent)]
+#[agent(kind = "drive")]
+pub struct DriveBase {
+    /// What the coordinator chose.
+    wish: Input<Twist>,
+    /// Orders of people, in numbers or in words such as "turn right a little bit"; while one holds, the coordinator is not heard.
+    words: Input<Offer>,
+    /// What is allowed. Once wired, its silence forbids to move forward.
+    safety: Input<Safety>,
+    /// A bound from a sensor: each part of the motion is at most as fast as that of the reflex. It can only slow or stop.
+    reflex: Input<Twist>,
+    /// How the robot really moves, from its wheels.
+    odometry: Input<Odometry>,
+    /// What the wheels shall do.
+    #[robot("drive")]
+    #[port(history = 64)]
+    command: Output<Twist>,
+    /// How the robot really moves.
+    #[port(history = 64)]
+    state: Output<Twist>,
+    params: DriveParams,
+    hands: Hands,
+}
+
+impl Agent for DriveBase {
+    fn step(&mut self, step: &mut Step) -> Result<(), Fault> {
+        let now = step.now;
+        while let Some(offer) = self.words.take() {
+            self.hands.orders.put(offer.header().sender, *offer, now);
+        }
+        if let Some(received) = self.wish.newest() {
+            self.hands.wish = Some(Dated { value: *received, stamp: received.header().stamp });
+        }
+        if let Some(received) = self.safety.newest() {
+            self.hands.safety = Some(Dated { value: *received, stamp: received.header().stamp });
+        }
+        while let Some(received) = self.reflex.take() {
+            self.hands.reflex = Some(Dated { value: *received, stamp: received.header().stamp });
+        }
+        if let Some(odometry) = self.odometry.latest() {
+            self.hands.motion = Some(odometry.twist);
+        }
+        let command = self.hands.command(&self.params, self.safety.is_wired(), now);
+        self.command.send(command);
+        self.state.send(self.hands.motion.unwrap_or(command));
+        Ok(())
+    }
+}
+
+/// The longest time between two steps that the limits of acceleration are granted at once (s).
+const LONGEST_STEP: f64 = 0.1;
+
+/// What was said last, and what was commanded.
+#[derive(Clone, Copy, Debug, Default)]
+struct Hands {
+    wish: Option<Dated<Twist>>,
+    orders: Offers,
+    safety: Option<Dated<Safety>>,
+    reflex: Option<Dated<Twist>>,
+    motion: Option<Twist>,
+    commanded: Twist,
+    cuts: Cuts,
+    last: Option<Time>,
+}
+
+impl Hands {
+    fn command(&mut self, params: &DriveParams, guarded: bool, now: Time) -> Twist {
+        let dt = self.last.replace(now).map_or(0.0, |last| (now - last).seconds().min(LONGEST_STEP));
+        let veto = self.veto(params, guarded, now);
+        let mut wanted = self.wanted(params, &veto, now);
+        let forward = if veto.forward { Forward::Allowed } else { Forward::Forbidden };
+        if wanted.linear > veto.linear_max {
+            // Slower on the same path.
+            wanted = motion::kinematics::scaled(wanted, veto.linear_max.max(0.0) / wanted.linear);
+        }
+        let limited = limit(&params.limits(), wanted, self.commanded, forward, dt);
+        self.cuts = limited.cuts;
+        self.commanded = match Dated::fresh(&self.reflex, now, params.reflex_hold) {
+            Some(bound) => bounded(limited.twist, bound),
+            None => limited.twist,
+        };
+        self.commanded
+    }
+
+    /// The orders of people while one holds, else the wish of the coordinator while it is fresh, else nothing.
+    fn wanted(&mut self, params: &DriveParams, veto: &Veto, now: Time) -> Twist {
+        self.orders.forget_expired(now);
+        let (orders, len) = self.orders.weighed(|_| 1.0);
+        let moment = Moment { now, present: self.motion.unwrap_or(self.commanded), veto: *veto };
+        let fused = fuse(&params.fusion(), &orders[..len], &moment, &mut Held::default());
+        match fused.cause {
+            Cause::Offers | Cause::Stop => fused.twist,
+            Cause::Held | Cause::Silence => {
+                Dated::fresh(&self.wish, now, params.wish_age).unwrap_or(Twist::ZERO)
+            }
+        }
+    }
+
+    fn veto(&self, params: &DriveParams, guarded: bool, now: Time) -> Veto {
+        match Dated::fresh(&self.safety, now, params.safety_age) {
+            Some(safety) => Veto {
+                forward: !safety.blind && safety.linear_max > 0.0,
+                linear_max: safety.linear_max,
+                wider: safety.wider,
+            },
+            None if guarded => Veto { forward: false, ..Veto::NONE },
+            None => Veto::NONE,
+        }
+    }
+}
+
+/// Each part at most as fast as that of the bound; a bound that is no number stops.
+fn bounded(twist: Twist, bound: Twist) -> Twist {
+    if !is_finite(bound) {
+        return Twist::ZERO;
+    }
+    let part = |value: f64, most: f64| value.clamp(-most.abs(), most.abs());
+    Twist::new(part(twist.linear, bound.linear), part(twist.angular, bound.angular))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use motion::word;
+    use types::AgentId;
+    use types::messages::Drive;
+
+    fn at(millis: i64) -> Time {
+        Time::ZERO + Duration::millis(millis)
+    }
+
+    fn dated<T>(value: T) -> Option<Dated<T>> {
+        Some(Dated { value, stamp: Time::ZERO })
+    }
+
+    /// What is commanded after a tenth of a second, from driving at 0.3 m/s.
+    fn after(mut hands: Hands, guarded: bool) -> Twist {
+        hands.commanded = Twist::new(0.3, 0.0);
+        hands.last = Some(Time::ZERO);
+        hands.command(&DriveParams::default(), guarded, at(100))
+    }
+
+    fn words(text: &str) -> Offer {
+        let word = word::parse(text).unwrap();
+        Offer { word, weight: 1.0, valid_until: at(1000), form: Drive::Linguistic, ..Offer::default() }
+    }
+
+    #[test]
+    fn a_wish_is_followed_as_fast_as_the_wheels_allow() {
+        let hands = Hands { wish: dated(Twist::new(0.6, 0.0)), ..Hands::default() };
+        assert!((after(hands, false).linear - 0.35).abs() < 1e-12, "0.5 m/s² for 0.1 s");
+        let nonsense = Hands { wish: dated(Twist::new(f64::NAN, 1.0)), ..Hands::default() };
+        assert!((after(nonsense, false).linear - 0.2).abs() < 1e-12, "braking at 1 m/s²");
+    }
+
+    #[test]
+    fn an_old_wish_is_standing_still() {
+        let mut hands = Hands { wish: dated(Twist::new(0.3, 0.0)), ..Hands::default() };
+        let params = DriveParams::default();
+        hands.command(&params, false, at(0));
+        let mut command = |millis: i64| hands.command(&params, false, at(millis)).linear;
+        let driving = (1..=6).map(|i| command(50 * i)).last().unwrap();
+        assert!((driving - 0.15).abs() < 1e-12, "{driving}");
+        let stopped = (7..=13).map(|i| command(50 * i)).last().unwrap();
+        assert_eq!(stopped, 0.0);
+    }
+
+    #[test]
+    fn people_come_before_the_robots_wish_and_safety_before_people() {
+        let mut hands = Hands { wish: dated(Twist::new(0.3, 0.0)), ..Hands::default() };
+        hands.orders.put(AgentId(7), words("turn right"), Time::ZERO);
+        let turned = after(hands, false);
+        assert!(turned.angular < -0.2, "{turned:?}");
+        hands.orders.put(AgentId(7), words("stop"), Time::ZERO);
+        assert!((after(hands, false).linear - 0.2).abs() < 1e-12);
+        hands.orders.put(AgentId(7), words("go forward"), Time::ZERO);
+        assert!(after(hands, false).linear > 0.3);
+        assert!(after(hands, true).linear < 0.21, "safety was not heard");
+        hands.safety = dated(Safety { linear_max: 0.25, ..Safety::default() });
+        assert!((after(hands, true).linear - 0.25).abs() < 1e-12);
+    }
+
+    #[test]
+    fn a_reflex_slows_and_stops_but_never_drives() {
+        let wish = dated(Twist::new(0.3, 0.2));
+        let with = |reflex: Twist| after(Hands { wish, reflex: dated(reflex), ..Hands::default() }, false);
+        assert_eq!(with(Twist::ZERO), Twist::ZERO, "at once, whatever the limits of braking");
+        assert_eq!(with(Twist::new(0.1, 5.0)).linear, 0.1);
+        assert_eq!(with(Twist::new(f64::NAN, 0.0)), Twist::ZERO);
+        let standing = Hands { reflex: dated(Twist::new(0.5, 0.5)), ..Hands::default() };
+        assert!(after(standing, false).linear <= 0.2 + 1e-12, "nobody wished to move");
+    }
+}

@@ -1,0 +1,335 @@
+//! The safety monitor: how fast is safe, whether the robot may move forward at all, and a way out of danger.
+//!
+//! It runs when ranges come, and once more when they stay away: then it is blind, and says so.
+
+use motion::ring::Ring;
+use motion::safety::{Parameters, Verdict, judge};
+use runtime::{Agent, Fault, Input, Output, Step};
+use types::geometry::PI;
+use types::messages::{Drive, Odometry, Offer, Ranges, Safety, Twist};
+use types::params::Params;
+use types::{Duration, Pose, Time};
+
+use crate::recall::{POINTS_AROUND, Recall, Sensors};
+use crate::shared::{Dated, ring};
+
+/// What the robot is, and how careful it shall be.
+#[derive(Clone, Debug, Params)]
+pub struct SafetyParams {
+    /// Radius of the round body (m). 0.225 is that of the exploring robot.
+    #[param(default = 0.225, min = 0.01, max = 2.0)]
+    pub radius: f64,
+    /// Half the opening angle of one beam (rad). PI / 12 is 15°, that of a common ultrasonic transducer; 0 for a laser.
+    #[param(default = PI / 12.0, min = 0.0, max = 1.6)]
+    pub cone: f64,
+    /// Room kept on both sides of the way ahead (m). 0.02 lets it through doors.
+    #[param(default = 0.02, min = 0.0, max = 1.0)]
+    pub side_margin: f64,
+    /// Way left in front after stopping, from the body's rim (m). 0.05 keeps it from creeping up on what it stopped for.
+    #[param(default = 0.05, min = 0.0, max = 2.0)]
+    pub margin: f64,
+    /// Way ahead, from the body's rim, below which it must not move forward (m). 0.2 is clear of the 0.15 m below which a sonar tells nothing.
+    #[param(default = 0.2, min = 0.0, max = 5.0)]
+    pub stop_distance: f64,
+    /// From an echo to the wheels' answer (s). 0.35 is a period of the sonar, one of the drive and the lag of the motors.
+    #[param(default = 0.35, min = 0.0, max = 5.0)]
+    pub reaction: f64,
+    /// Braking (m/s²). 1 brakes without tipping.
+    #[param(default = 1.0, min = 0.05, max = 20.0)]
+    pub deceleration: f64,
+    /// Highest speed at all (m/s). 0.6 is a slow walk, so people can step aside.
+    #[param(default = 0.6, min = 0.0, max = 10.0)]
+    pub linear_max: f64,
+    /// Room from the rim to both sides together, below which it is narrow (m). 0.45 is where a second robot would not fit.
+    #[param(default = 0.45, min = 0.0, max = 10.0)]
+    pub narrow: f64,
+    /// Way from the rim beyond which nothing is a danger (m). 1.5 is four seconds at a slow walk.
+    #[param(default = 1.5, min = 0.05, max = 50.0)]
+    pub horizon: f64,
+    /// Ranges older than this are not trusted (time). 600 ms is two missed readings of a sonar at 4 Hz.
+    #[param(default = Duration::millis(600), min = 0.01, max = 60.0)]
+    pub stale: Duration,
+    /// From this danger on it turns away from what is near (0 to 1). 0.5 is half way to where stopping in time ends.
+    #[param(default = 0.5, min = 0.0, max = 1.0)]
+    pub avoid_from: f64,
+    /// Turn rate at which it turns away (rad/s). 0.7 turns by a beam of 30° in three readings.
+    #[param(default = 0.7, min = 0.0, max = 10.0)]
+    pub avoid_turn: f64,
+    /// Highest speed while it turns away (m/s). 0.2 keeps the curve short.
+    #[param(default = 0.2, min = 0.0, max = 10.0)]
+    pub avoid_speed: f64,
+    /// Distance from the rim at which it only creeps, and steers away from what is beside it (m). 0.17: a sonar tells 0.15 m of all that is nearer.
+    #[param(default = 0.17, min = 0.0, max = 2.0)]
+    pub touch: f64,
+    /// Highest speed with something that close beside it (m/s). 0.1 is 2.5 cm between two readings at 4 Hz.
+    #[param(default = 0.1, min = 0.0, max = 10.0)]
+    pub creep: f64,
+    /// How long what was near is remembered while no sensor hears it (time). 30 s is how long a robot may turn about in a corner; on so short a way the odometry drifts by centimetres.
+    #[param(default = Duration::secs(30), min = 0.0, max = 60.0)]
+    pub remember: Duration,
+    /// How long a wish of it holds (time). 500 ms is two readings of a sonar at 4 Hz.
+    #[param(default = Duration::millis(500), min = 0.01, max = 60.0)]
+    pub hold: Duration,
+}
+
+impl SafetyParams {
+    fn law(&self) -> Parameters {
+        Parameters {
+            radius: self.radius,
+            cone: self.cone,
+            side_margin: self.side_margin,
+            margin: self.margin,
+            stop: self.stop_distance,
+            reaction: self.reaction,
+            deceleration: self.deceleration,
+            linear_max: self.linear_max,
+            narrow: self.narrow,
+            horizon: self.horizon,
+        }
+    }
+}
+
+/// Says how fast is safe, forbids to move forward (not to turn) when something is too close, and offers to turn to the wider side.
+#[derive(Agent)]
+pub struct SafetyMonitor {
+    /// What is around, filtered.
+    ranges: Input<Ranges>,
+    /// The same as it was measured: without delay, but perhaps with false echoes. Without a wire the filtered ones count for both.
+    raw: Input<Ranges>,
+    /// How the robot moves.
+    odometry: Input<Odometry>,
+    /// The verdict: danger, the speed that is allowed, the wider side.
+    #[port(history = 64)]
+    safety: Output<Safety>,
+    /// A wish to turn away from what is near.
+    drive: Output<Offer>,
+    params: SafetyParams,
+    watch: Watch,
+}
+
+impl Agent for SafetyMonitor {
+    fn step(&mut self, step: &mut Step) -> Result<(), Fault> {
+        if let Some(received) = self.ranges.newest() {
+            self.watch.filtered = Some(Dated { value: *received, stamp: received.header().stamp });
+        }
+        if let Some(received) = self.raw.newest() {
+            self.watch.raw = Some(Dated { value: *received, stamp: received.header().stamp });
+        }
+        if let Some(odometry) = self.odometry.latest() {
+            self.watch.motion = odometry.twist;
+            self.watch.pose = Some(odometry.pose);
+        }
+        if let Some(filtered) = &self.watch.filtered {
+            self.watch.heard_at = self.odometry.at(filtered.stamp).map(|found| found.value().pose);
+        }
+        let was_blind = self.watch.blind;
+        let (safety, offer) = self.watch.judge(&self.params, step.now);
+        if safety.blind && !was_blind {
+            runtime::note!("blind: no ranges that can be trusted");
+        }
+        self.watch.blind = safety.blind;
+        self.safety.send(safety);
+        if let Some(offer) = offer {
+            self.drive.send(offer);
+        }
+        // When no ranges come, this is when those that are here become too old.
+        if let Some(ranges) = self.watch.filtered.filter(|_| !safety.blind) {
+            step.wake_at(ranges.stamp + self.params.stale + Duration::nanos(1));
+        }
+        Ok(())
+    }
+}
+
+/// What is farther from straight ahead than this is passed, not driven at (rad): 80°.
+const PASSING: f64 = 1.4;
+
+/// What was heard last, and the side on which the robot turns away.
+#[derive(Clone, Copy, Debug, Default)]
+struct Watch {
+    filtered: Option<Dated<Ranges>>,
+    raw: Option<Dated<Ranges>>,
+    motion: Twist,
+    /// Where the robot is, and where it was when the ranges were measured.
+    pose: Option<Pose>,
+    heard_at: Option<Pose>,
+    recall: Recall,
+    /// The stamp of the ranges that were taken over last.
+    recalled: Option<Time>,
+    /// 1 for left, −1 for right; 0 while nothing is to be avoided.
+    side: f64,
+    /// Whether that was said already.
+    blind: bool,
+}
+
+impl Watch {
+    fn judge(&mut self, params: &SafetyParams, now: Time) -> (Safety, Option<Offer>) {
+        let Some(filtered) = Dated::fresh(&self.filtered, now, params.stale) else {
+            self.side = 0.0;
+            return (Safety { danger: 1.0, blind: true, ..Safety::default() }, None);
+        };
+        let raw = Dated::fresh(&self.raw, now, params.stale).unwrap_or(filtered);
+        let mut verdict = judge(&params.law(), ring(&raw), ring(&filtered), self.motion);
+        let stamp = self.filtered.map_or(now, |filtered| filtered.stamp);
+        if let Some(remembered) = self.remembered(params, &filtered, stamp) {
+            verdict.forward &= remembered.forward;
+            verdict.linear_max = verdict.linear_max.min(remembered.linear_max);
+            verdict.danger = verdict.danger.max(remembered.danger);
+            if remembered.nearest < verdict.nearest {
+                (verdict.nearest, verdict.nearest_bearing) = (remembered.nearest, remembered.nearest_bearing);
+            }
+        }
+        self.touch(params, &mut verdict);
+        let nothing_heard =
+            [ring(&raw), ring(&filtered)].iter().all(|ring: &Ring<'_>| ring.echoes().next().is_none());
+        let safety = Safety {
+            danger: verdict.danger,
+            linear_max: verdict.linear_max,
+            wider: verdict.wider,
+            nearest: verdict.nearest,
+            nearest_bearing: verdict.nearest_bearing,
+            narrow: verdict.narrow,
+            blind: nothing_heard,
+        };
+        (safety, self.avoid(params, &verdict, now))
+    }
+
+    /// What it remembers counts as well as what it hears, but as points: where they lie is known better than a cone tells.
+    fn remembered(&mut self, params: &SafetyParams, filtered: &Ranges, stamp: Time) -> Option<Verdict> {
+        let pose = self.pose?;
+        let sensors = Sensors {
+            rim: params.radius,
+            cone: params.cone,
+            reach: params.radius + params.horizon,
+            keep: params.remember,
+        };
+        if self.recalled != Some(stamp) {
+            self.recall.update(&sensors, filtered, self.heard_at.unwrap_or(pose), stamp);
+            self.recalled = Some(stamp);
+        }
+        let mut room = [(0.0, 0.0); POINTS_AROUND];
+        let points = Ring::Beams(self.recall.around(pose, &mut room));
+        let law = Parameters { cone: 0.0, ..params.law() };
+        (!points.is_empty()).then(|| judge(&law, points, points, self.motion))
+    }
+
+    /// With something at its side as near as can be told it creeps, and only past it or away from it, not on towards it.
+    fn touch(&mut self, params: &SafetyParams, verdict: &mut Verdict) {
+        if verdict.nearest > params.touch || verdict.nearest_bearing.abs() > 0.6 * PI {
+            return;
+        }
+        self.side = if verdict.nearest_bearing > 0.0 { -1.0 } else { 1.0 };
+        verdict.wider = self.side;
+        verdict.forward &= verdict.nearest_bearing.abs() > PASSING;
+        verdict.linear_max = if verdict.forward { verdict.linear_max.min(params.creep) } else { 0.0 };
+        verdict.danger = 1.0;
+    }
+
+    /// Away from what is near. The side is chosen once for each danger: to choose anew at every reading is to dither before a pillar.
+    fn avoid(&mut self, params: &SafetyParams, verdict: &Verdict, now: Time) -> Option<Offer> {
+        if verdict.danger < params.avoid_from {
+            self.side = 0.0;
+            return None;
+        }
+        if self.side == 0.0 {
+            self.side = if verdict.wider < 0.0 { -1.0 } else { 1.0 };
+        }
+        // With room ahead it is no wall but a neighbour: the nearer it is in front, the harder the turn.
+        let turn = if verdict.forward { params.avoid_turn * verdict.danger } else { params.avoid_turn };
+        Some(Offer {
+            twist: Twist::new(verdict.linear_max.min(params.avoid_speed), self.side * turn),
+            weight: verdict.danger,
+            valid_until: now + params.hold,
+            form: Drive::Numeric,
+            ..Offer::default()
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::shared::blank;
+
+    /// Twelve directions; `front` straight ahead, `left` and `right` in the three of each side, 4 m elsewhere.
+    fn around(front: f32, left: f32, right: f32) -> Ranges {
+        let mut ranges = blank(12, 0.3, 6.2);
+        ranges.values.fill(4.0);
+        ranges.values[0] = front;
+        ranges.values[2..=4].fill(left);
+        ranges.values[8..=10].fill(right);
+        ranges
+    }
+
+    fn watch(ranges: Ranges) -> Watch {
+        Watch { filtered: Some(Dated { value: ranges, stamp: Time::ZERO }), ..Watch::default() }
+    }
+
+    #[test]
+    fn too_close_ahead_it_turns_to_the_wider_side_and_does_not_move() {
+        for (left, right, side) in [(3.0, 0.6, 1.0), (0.6, 3.0, -1.0)] {
+            let (safety, offer) = watch(around(0.4, left, right)).judge(&SafetyParams::default(), Time::ZERO);
+            let offer = offer.unwrap();
+            assert_eq!((safety.linear_max, offer.twist.linear, offer.weight), (0.0, 0.0, 1.0));
+            assert_eq!(offer.twist.angular, side * 0.7);
+        }
+    }
+
+    #[test]
+    fn once_it_turns_away_it_keeps_the_side_until_the_danger_is_over() {
+        let params = SafetyParams::default();
+        let mut watch = watch(around(0.4, 3.0, 2.9));
+        let mut turn = |front, left, right| {
+            watch.filtered = Some(Dated { value: around(front, left, right), stamp: Time::ZERO });
+            watch.judge(&params, Time::ZERO).1.map(|offer| offer.twist.angular.signum())
+        };
+        let turns = [turn(0.4, 3.0, 2.9), turn(0.4, 1.4, 1.5), turn(4.0, 4.0, 4.0), turn(0.4, 1.4, 1.5)];
+        assert_eq!(turns, [Some(1.0), Some(1.0), None, Some(-1.0)]);
+    }
+
+    #[test]
+    fn old_ranges_are_none() {
+        let mut watch = watch(around(4.0, 4.0, 4.0));
+        let params = SafetyParams::default();
+        assert!(!watch.judge(&params, Time::ZERO + params.stale).0.blind);
+        let (safety, offer) = watch.judge(&params, Time::ZERO + params.stale + Duration::nanos(1));
+        assert!(safety.blind && safety.linear_max == 0.0 && safety.danger == 1.0 && offer.is_none());
+    }
+
+    #[test]
+    fn what_no_sensor_hears_any_more_still_stops_it() {
+        let params = SafetyParams::default();
+        let mut watch = watch(around(0.7, 4.0, 4.0));
+        watch.pose = Some(Pose::default());
+        watch.judge(&params, Time::ZERO);
+        // A smooth box that is silent now, and a robot that has come nearer.
+        let later = Time::from_seconds(2.0);
+        watch.filtered = Some(Dated { value: around(6.2, 4.0, 4.0), stamp: later });
+        watch.pose = Some(Pose::new(0.3, 0.0, 0.0));
+        assert_eq!(watch.judge(&params, later).0.linear_max, 0.0);
+        let unaware = SafetyParams { remember: Duration::ZERO, ..params };
+        let later = Time::from_seconds(2.1);
+        watch.filtered = Some(Dated { value: around(6.2, 4.0, 4.0), stamp: later });
+        assert!(watch.judge(&unaware, later).0.linear_max > 0.0);
+    }
+
+    #[test]
+    fn with_something_close_beside_it_it_creeps_past_but_not_towards_it() {
+        let params = SafetyParams::default();
+        let beside = |direction: usize| {
+            let mut ranges = around(4.0, 4.0, 4.0);
+            ranges.values[direction] = 0.375;
+            let (safety, offer) = watch(ranges).judge(&params, Time::ZERO);
+            (safety.linear_max, offer.unwrap().twist.angular)
+        };
+        assert_eq!(beside(3), (0.1, -0.7), "straight to the left");
+        assert_eq!(beside(2), (0.0, -0.7), "ahead of that");
+        assert_eq!(beside(10), (0.0, 0.7), "on the right");
+    }
+
+    #[test]
+    fn a_raw_echo_right_ahead_forbids_to_move_before_the_filter_believes_it() {
+        let mut watch = watch(around(4.0, 4.0, 4.0));
+        watch.raw = Some(Dated { value: around(0.4, 4.0, 4.0), stamp: Time::ZERO });
+        assert_eq!(watch.judge(&SafetyParams::default(), Time::ZERO).0.linear_max, 0.0);
+    }
+}

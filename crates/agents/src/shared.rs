@@ -1,0 +1,133 @@
+//! What several agents need.
+
+use motion::fusion::SHARES_MAX;
+use motion::ring::Ring;
+use types::geometry::TAU;
+use types::messages::{Offer, Ranges};
+use types::{AgentId, Duration, Time};
+
+/// The frame of the robot's body, at whose origin all distances begin.
+pub(crate) const BODY: &str = "base_link";
+
+/// Ranges in the form that the laws of motion take.
+pub(crate) fn ring(ranges: &Ranges) -> Ring<'_> {
+    Ring::Sweep {
+        angle_min: ranges.angle_min.into(),
+        angle_step: ranges.angle_step.into(),
+        ranges: &ranges.values,
+    }
+}
+
+/// Ranges in `directions` around the robot, the first straight ahead, of which nothing is known yet.
+pub(crate) fn blank(directions: usize, range_min: f32, range_max: f32) -> Ranges {
+    let mut ranges = Ranges {
+        frame: BODY.into(),
+        angle_min: 0.0,
+        angle_step: (TAU / directions.max(1) as f64) as f32,
+        range_min,
+        range_max,
+        ..Ranges::default()
+    };
+    ranges.values.resize(directions);
+    ranges.values.fill(f32::NAN);
+    ranges
+}
+
+/// A value and the time that it speaks of.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Dated<T> {
+    pub(crate) value: T,
+    pub(crate) stamp: Time,
+}
+
+impl<T: Copy> Dated<T> {
+    /// The value, unless it is older than `age`.
+    pub(crate) fn fresh(held: &Option<Dated<T>>, now: Time, age: Duration) -> Option<T> {
+        held.as_ref().filter(|dated| now - dated.stamp <= age).map(|dated| dated.value)
+    }
+}
+
+/// The last offer of each sender. A newer one replaces the older one of the same sender.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Offers {
+    rows: [(AgentId, Offer); SHARES_MAX],
+    len: usize,
+    /// Offers that found no place among those that still hold.
+    pub(crate) turned_away: u64,
+}
+
+impl Default for Offers {
+    fn default() -> Offers {
+        Offers { rows: [(AgentId::NONE, Offer::default()); SHARES_MAX], len: 0, turned_away: 0 }
+    }
+}
+
+impl Offers {
+    /// Keeps an offer. With all places taken it replaces one that has expired; without such a one it is turned away and counted.
+    pub(crate) fn put(&mut self, sender: AgentId, offer: Offer, now: Time) {
+        if let Some(place) = self.rows[..self.len].iter_mut().find(|(known, _)| *known == sender) {
+            place.1 = offer;
+        } else if self.len < SHARES_MAX {
+            self.rows[self.len] = (sender, offer);
+            self.len += 1;
+        } else if let Some(place) = self.rows.iter_mut().find(|(_, held)| held.valid_until < now) {
+            *place = (sender, offer);
+        } else {
+            self.turned_away += 1;
+        }
+    }
+
+    /// Drops what has expired, so that old offers are not counted again in every step.
+    pub(crate) fn forget_expired(&mut self, now: Time) {
+        let mut kept = 0;
+        for i in 0..self.len {
+            if self.rows[i].1.valid_until >= now {
+                self.rows[kept] = self.rows[i];
+                kept += 1;
+            }
+        }
+        self.len = kept;
+    }
+
+    /// The offers, each with what `weight` says of its sender.
+    pub(crate) fn weighed(&self, weight: impl Fn(AgentId) -> f64) -> ([(Offer, f64); SHARES_MAX], usize) {
+        let mut out = [(Offer::default(), 0.0); SHARES_MAX];
+        for (out, (sender, offer)) in out.iter_mut().zip(&self.rows[..self.len]) {
+            *out = (*offer, weight(*sender));
+        }
+        (out, self.len)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn until(millis: i64) -> Offer {
+        Offer { weight: 1.0, valid_until: Time::ZERO + Duration::millis(millis), ..Offer::default() }
+    }
+
+    #[test]
+    fn a_sender_has_one_offer_and_the_expired_make_room() {
+        let mut offers = Offers::default();
+        offers.put(AgentId(0), until(10), Time::ZERO);
+        offers.put(AgentId(0), until(20), Time::ZERO);
+        for i in 1..SHARES_MAX as u32 {
+            offers.put(AgentId(i), until(50), Time::ZERO);
+        }
+        offers.put(AgentId(99), until(50), Time::ZERO);
+        assert_eq!((offers.len, offers.turned_away), (SHARES_MAX, 1), "nothing has expired");
+        let later = Time::ZERO + Duration::millis(30);
+        offers.put(AgentId(99), until(50), later);
+        assert_eq!((offers.len, offers.turned_away), (SHARES_MAX, 1), "the first made room");
+        offers.forget_expired(Time::ZERO + Duration::millis(51));
+        assert_eq!(offers.len, 0);
+    }
+
+    #[test]
+    fn an_old_value_is_none() {
+        let held = Some(Dated { value: 7, stamp: Time::ZERO });
+        assert_eq!(Dated::fresh(&held, Time::ZERO + Duration::millis(5), Duration::millis(5)), Some(7));
+        assert_eq!(Dated::fresh(&held, Time::ZERO + Duration::millis(6), Duration::millis(5)), None);
+    }
+}
