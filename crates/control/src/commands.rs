@@ -1,0 +1,276 @@
+//! What each command does.
+
+use std::collections::HashMap;
+use std::sync::mpsc::{Receiver, sync_channel};
+use std::sync::{Arc, Mutex, PoisonError};
+use std::time::{Duration, Instant};
+
+use runtime::{Control, Heard, Refusal, Request, owner};
+use serde_json::{Value as Json, json};
+use types::value::{Table, Value};
+
+use crate::json::{from_json, table_to_json};
+use crate::outbox::Outbox;
+use crate::protocol::{COMMANDS, Question};
+use crate::server::Hooks;
+use crate::taps::{Ear, Taps};
+use crate::words::{self, CHANGES, Pairs};
+use crate::shapes;
+
+/// How many decisions are shown when nobody says.
+const DECISIONS: usize = 10;
+/// How long a call waits for its answer when nobody says.
+const CALL_WAITS: types::Duration = types::Duration::secs(2);
+/// How long a call waits at most: others who call the same service wait with it.
+const LONGEST_CALL: types::Duration = types::Duration::secs(60);
+/// How long an answer that did not come in time keeps others from calling the same service: it would be taken for theirs.
+const LATE_ANSWER: Duration = Duration::from_secs(30);
+
+type Answer = Result<Json, Refusal>;
+
+/// A call whose answer did not come in time.
+struct Late {
+    answer: Receiver<Heard>,
+    since: Instant,
+}
+
+/// One call of a service from outside at a time.
+type Calling = Arc<Mutex<Option<Late>>>;
+
+/// Does what clients ask.
+pub(crate) struct Commands {
+    control: Control,
+    hooks: Arc<dyn Hooks>,
+    taps: Arc<Taps>,
+    /// The services that were called. Calls from outside carry no marker of their own, so each service gets one at a time.
+    calling: Mutex<HashMap<String, Calling>>,
+}
+
+/// Who asks.
+pub(crate) struct Asker {
+    pub client: u64,
+    pub outbox: Arc<Outbox>,
+}
+
+impl Commands {
+    pub(crate) fn new(control: Control, hooks: Arc<dyn Hooks>, taps: Arc<Taps>) -> Commands {
+        Commands { control, hooks, taps, calling: Mutex::default() }
+    }
+
+    /// Does what is asked, and says what came of it.
+    pub(crate) fn answer(&self, asker: &Asker, question: &Question) -> Answer {
+        let words = &question.words;
+        let Some((verb, rest)) = words.split_first() else {
+            return Err(Refusal::new("nothing is asked").help("\"help\" tells all commands"));
+        };
+        if question.message.is_some() && !matches!(verb.as_str(), "send" | "call") {
+            return Err(Refusal::new(format!("\"{verb}\" takes no message")));
+        }
+        match verb.as_str() {
+            "ls" => alone(words).and_then(|()| Ok(shapes::ls(&self.control.view()?))),
+            "graph" => alone(words).and_then(|()| Ok(shapes::graph(&self.control.view()?))),
+            "top" => alone(words).and_then(|()| Ok(shapes::top(&self.control.view()?))),
+            "plan" => alone(words).and_then(|()| self.plan()),
+            "tap" => self.tap(asker, rest),
+            "untap" => self.untap(asker, rest),
+            "send" => self.send(rest, question.message.as_ref()),
+            "call" => self.call(rest, question.message.as_ref()),
+            "stop" => self.hooks.stop(&rest.join(" ")).map(|()| true.into()),
+            "reset" => alone(words).and_then(|()| self.hooks.reset()).map(|()| true.into()),
+            "why" => self.why(rest),
+            "help" => alone(words).map(|()| self.help()),
+            _ => self.other(verb, words),
+        }
+    }
+
+    fn plan(&self) -> Answer {
+        let (agents, wires) = self.control.plan()?;
+        Ok(shapes::plan(&self.control.view()?.name, &agents, &wires))
+    }
+
+    fn why(&self, rest: &[String]) -> Answer {
+        let number = |word: &String| word.parse().map_err(|_| wrong_form("why", format!("\"{word}\" is no number")));
+        match rest {
+            [] => self.hooks.why(DECISIONS),
+            [word] => self.hooks.why(number(word)?),
+            _ => Err(wrong_form("why", "there are too many words")),
+        }
+    }
+
+    fn help(&self) -> Json {
+        let own = COMMANDS.iter().chain(CHANGES.iter().filter(|usage| usage.verb != "send"));
+        let more = self.hooks.more();
+        own.chain(more)
+            .map(|usage| json!({"verb": usage.verb, "form": usage.form, "does": usage.does}))
+            .collect::<Vec<_>>()
+            .into()
+    }
+
+    /// A change of the system, or a command of the program's own.
+    fn other(&self, verb: &str, words: &[String]) -> Answer {
+        if self.hooks.more().iter().any(|usage| usage.verb == verb) {
+            return self.hooks.command(words);
+        }
+        if !CHANGES.iter().any(|usage| usage.verb == verb) {
+            let known = COMMANDS.iter().chain(&CHANGES).chain(self.hooks.more()).map(|usage| usage.verb);
+            return Err(Refusal::unknown("command", verb, known));
+        }
+        let request = words::parse(words)?;
+        let changes_agents = changes_agents(&request);
+        self.control.request(request)?;
+        if changes_agents {
+            self.taps.renew();
+        }
+        Ok(true.into())
+    }
+
+    fn tap(&self, asker: &Asker, rest: &[String]) -> Answer {
+        let (port, rest) = port("tap", rest)?;
+        let mut pairs = Pairs::read("tap", rest)?;
+        let every = pairs.number::<u64>("every")?.unwrap_or(1).max(1);
+        pairs.finish("tap", &["every"])?;
+        let ear = Ear::Client { client: asker.client, outbox: asker.outbox.clone(), every, heard: 0, lost: 0 };
+        let definition = self.taps.listen(port, ear)?;
+        Ok(json!({"port": port, "message": definition.name, "definition": definition.text()}))
+    }
+
+    fn untap(&self, asker: &Asker, rest: &[String]) -> Answer {
+        let (port, rest) = port("untap", rest)?;
+        match rest {
+            [] if self.taps.leave(port, asker.client) => Ok(true.into()),
+            [] => Err(Refusal::new(format!("{port} is not listened to by this client"))),
+            _ => Err(wrong_form("untap", "there are too many words")),
+        }
+    }
+
+    fn send(&self, rest: &[String], message: Option<&Json>) -> Answer {
+        let (port, pairs) = port("send", rest)?;
+        if message.is_none() && pairs.first().is_some_and(|word| word.starts_with("cdr=")) {
+            let words: Vec<String> = ["send".to_owned()].into_iter().chain(rest.iter().cloned()).collect();
+            return self.control.request(words::parse(&words)?).map(|()| true.into());
+        }
+        let message = message_of("send", pairs, message)?;
+        let cdr = self.encode(port, &message)?;
+        self.control.request(Request::Send { port: port.to_owned(), cdr })?;
+        Ok(true.into())
+    }
+
+    fn encode(&self, port: &str, message: &Json) -> Result<Vec<u8>, Refusal> {
+        self.hooks.encode(&self.taps.definition(port)?, message).map_err(Refusal::new)
+    }
+
+    /// Calls a service. A call goes out of a client that is wired to it, without a marker: those of the client itself always
+    /// have one, so each answer finds its own.
+    fn call(&self, rest: &[String], message: Option<&Json>) -> Answer {
+        let (service, rest) = port("call", rest)?;
+        let (within, rest): (Vec<&String>, Vec<&String>) =
+            rest.iter().partition(|word| word.starts_with("within="));
+        let within: Vec<String> = within.into_iter().cloned().collect();
+        let rest: Vec<String> = rest.into_iter().cloned().collect();
+        let within = Pairs::read("call", &within)?.span("within")?.unwrap_or(CALL_WAITS).min(LONGEST_CALL);
+        let client = self.client_of(service)?;
+        let question = self.encode(&client, &message_of("call", &rest, message)?)?;
+
+        let calling = self.calling.lock().unwrap_or_else(PoisonError::into_inner).entry(service.to_owned()).or_default().clone();
+        let mut late = calling.lock().unwrap_or_else(PoisonError::into_inner);
+        self.settle(&mut late, service)?;
+        let (sender, answer) = sync_channel(1);
+        let definition = self.taps.listen(service, Ear::Call(sender))?;
+        let sent = self.control.request(Request::Send { port: client, cdr: question });
+        let heard = sent.map(|()| answer.recv_timeout(Duration::from_nanos(within.0.max(0) as u64)));
+        if let Ok(Err(_)) = heard {
+            #[expect(clippy::disallowed_methods, reason = "how long a client waits is a matter of the host's clock")]
+            let since = Instant::now();
+            *late = Some(Late { answer, since });
+            return Err(Refusal::new(format!("{service} did not answer within {within}")).help(look_at(service)));
+        }
+        self.taps.end_call(service);
+        match heard? {
+            Ok(heard) => self.hooks.decode(&definition, &heard.cdr).map_err(Refusal::new),
+            Err(_) => Err(Refusal::new("the system has ended")),
+        }
+    }
+
+    /// The client that is wired to a service.
+    fn client_of(&self, service: &str) -> Result<String, Refusal> {
+        let view = self.control.view()?;
+        let agent = view.agents.iter().find(|agent| agent.name == owner(service)).ok_or_else(|| {
+            Refusal::unknown("agent", owner(service), view.agents.iter().map(|agent| agent.name.as_str()))
+        })?;
+        let name = service.strip_prefix(&format!("{}.", agent.name)).unwrap_or_default();
+        let services = || agent.ports.iter().filter(|port| port.direction == runtime::Direction::Service);
+        if !services().any(|port| port.name == name) {
+            return Err(Refusal::unknown(
+                &format!("service of {}", agent.name),
+                name,
+                services().map(|port| port.name),
+            ));
+        }
+        view.wires.iter().find(|wire| wire.to == service).map(|wire| wire.from.clone()).ok_or_else(|| {
+            Refusal::new(format!("nobody is wired to {service}"))
+                .help("a call from outside goes out of a client that is: wire one first")
+        })
+    }
+
+    /// Refuses a call while the answer to the one before may still come and be taken for that of this one.
+    fn settle(&self, late: &mut Option<Late>, service: &str) -> Result<(), Refusal> {
+        let Some(call) = late else { return Ok(()) };
+        if call.answer.try_recv().is_err() && call.since.elapsed() < LATE_ANSWER {
+            let what = format!("{service} has not answered the call before this one");
+            return Err(Refusal::new(what).help(look_at(service)));
+        }
+        *late = None;
+        self.taps.end_call(service);
+        Ok(())
+    }
+}
+
+fn look_at(service: &str) -> String {
+    format!("see with \"ls\" whether {} runs", owner(service))
+}
+
+fn changes_agents(request: &Request) -> bool {
+    match request {
+        Request::Add(_) | Request::Remove(_) | Request::Replace { .. } => true,
+        Request::All(several) => several.iter().any(changes_agents),
+        _ => false,
+    }
+}
+
+fn wrong_form(verb: &str, what: impl Into<String>) -> Refusal {
+    let form = COMMANDS.iter().find(|usage| usage.verb == verb).map_or(verb, |usage| usage.form);
+    Refusal::new(what).help(format!("write: {form}"))
+}
+
+fn alone(words: &[String]) -> Result<(), Refusal> {
+    match words {
+        [verb, word, ..] => Err(wrong_form(verb, format!("\"{word}\" is one word too many for \"{verb}\""))),
+        _ => Ok(()),
+    }
+}
+
+/// The port that a command names, and the words behind it.
+fn port<'a>(verb: &str, rest: &'a [String]) -> Result<(&'a str, &'a [String]), Refusal> {
+    match rest.split_first() {
+        Some((port, rest)) if !port.contains('=') => Ok((port, rest)),
+        _ => Err(wrong_form(verb, format!("\"{verb}\" needs the name of a port"))),
+    }
+}
+
+/// The message that words or the question itself give.
+fn message_of(verb: &str, pairs: &[String], message: Option<&Json>) -> Result<Json, Refusal> {
+    let Some(message) = message else {
+        let mut table = Table::new();
+        for row in Pairs::read(verb, pairs)?.into_params()?.rows() {
+            table.set_path(&row.key, row.entry.clone())?;
+        }
+        return Ok(table_to_json(&table));
+    };
+    if let Some(word) = pairs.first() {
+        return Err(Refusal::new(format!("the message is given twice: by \"{word}\" and as \"message\"")));
+    }
+    match from_json(message) {
+        Value::Table(_) => Ok(message.clone()),
+        other => Err(Refusal::new(format!("a message is an object of its fields, not {}", other.kind()))),
+    }
+}

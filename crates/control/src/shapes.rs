@@ -1,0 +1,182 @@
+//! What is shown of a running system, as JSON. The shapes are stable: keys may be added, none goes or changes its meaning.
+//!
+//! | shape | keys |
+//! |---|---|
+//! | `ls` | `system`, `time_s`, `agents`: rows of `name`, `kind`, `state` (`running`, `restarting`, `dead`), `executor`, `asked`, `granted`, `period_s` (null without one), `deadline_s`, the counts, `last_death` (null when it never died), `params` |
+//! | `graph` | `system`, `time_s`, `agents`: rows of `name`, `kind`, `doc`, `executor`, `ports`: rows of `name`, `doc`, `direction` (`input`, `output`, `service`, `client`), `message`, `sent`; `wires`: rows of `from`, `to`, `message`, `depth`, `overload`, `filter`, `sent`, `taken`, `dropped`, `refused`, `expired` |
+//! | `top` | `system`, `time_s`, `messages`: `sent`, `taken`, `dropped`, `refused`, `expired` over all wires; `agents`: rows of `name`, `state`, `executor`, `asked`, `granted`, the counts, and the figures `exec`, `jitter`, `response` |
+//! | counts | `releases`, `missed`, `stalled`, `skipped`, `faults`, `panics`, `hangs`, `restarts` |
+//! | figure | `name`, `unit`, `n`, `min`, `p50`, `p99`, `p999`, `max`: unfiltered; all values null while `n` is 0 |
+//! | filter | `category` (null for all), `priority` (the least), `marker`, `recipient` (null for all), `every` |
+//!
+//! `time_s` is the system's own clock (s). `asked` and `granted` are the scheduling, as in `fifo 70`. Whatever was asked for and
+//! not granted, dropped or missed is in these numbers.
+
+use runtime::{
+    AgentPlan, AgentView, Direction, Figure, PortView, Refusal, Request, SystemView, WirePlan, WireView,
+};
+use serde_json::{Map, Value as Json, json};
+use types::{Duration, Filter};
+
+use crate::json::table_to_json;
+use crate::words;
+
+/// A figure of spans of time (ns).
+pub fn figure(name: &str, figure: &Figure) -> Json {
+    let shown = |x: f64| if figure.n == 0 { Json::Null } else { Json::from(x) };
+    json!({
+        "name": name, "unit": "ns", "n": figure.n, "min": shown(figure.min), "p50": shown(figure.p50),
+        "p99": shown(figure.p99), "p999": shown(figure.p999), "max": shown(figure.max),
+    })
+}
+
+/// The agents and how they are.
+pub fn ls(view: &SystemView) -> Json {
+    system(view, view.agents.iter().map(ls_agent).collect(), [])
+}
+
+/// Agents with their ports, and the wires between them.
+pub fn graph(view: &SystemView) -> Json {
+    let wires = view.wires.iter().map(graph_wire).collect();
+    system(view, view.agents.iter().map(graph_agent).collect(), [("wires", wires)])
+}
+
+/// Timing and counts.
+pub fn top(view: &SystemView) -> Json {
+    let sum = |of: fn(&WireView) -> u64| view.wires.iter().map(of).sum::<u64>();
+    let messages = json!({
+        "sent": sum(|wire| wire.sent), "taken": sum(|wire| wire.taken), "dropped": sum(|wire| wire.dropped),
+        "refused": sum(|wire| wire.refused), "expired": sum(|wire| wire.expired),
+    });
+    system(view, view.agents.iter().map(top_agent).collect(), [("messages", messages)])
+}
+
+/// The running system as the requests that would build it, each as a row of words.
+pub fn plan(name: &str, agents: &[AgentPlan], wires: &[WirePlan]) -> Json {
+    let adds = agents.iter().map(|agent| words::words_of(&Request::Add(agent.clone())));
+    let wires = wires.iter().map(|wire| words::words_of(&Request::Wire(wire.clone())));
+    json!({"system": name, "requests": adds.chain(wires).collect::<Vec<_>>()})
+}
+
+/// Reads what [`plan`] wrote.
+///
+/// # Errors
+/// When it is something else.
+pub fn read_plan(json: &Json) -> Result<(Vec<AgentPlan>, Vec<WirePlan>), Refusal> {
+    let wrong = || Refusal::new("this is no plan of a running system");
+    let (mut agents, mut wires) = (Vec::new(), Vec::new());
+    for request in json["requests"].as_array().ok_or_else(wrong)? {
+        let words: Option<Vec<String>> =
+            request.as_array().and_then(|row| row.iter().map(|word| word.as_str().map(str::to_owned)).collect());
+        match words::parse(&words.ok_or_else(wrong)?)? {
+            Request::Add(agent) => agents.push(agent),
+            Request::Wire(wire) => wires.push(wire),
+            _ => return Err(wrong()),
+        }
+    }
+    Ok((agents, wires))
+}
+
+fn system<const N: usize>(view: &SystemView, agents: Vec<Json>, more: [(&str, Json); N]) -> Json {
+    let mut shape = Map::new();
+    shape.insert("system".into(), json!(view.name));
+    shape.insert("time_s".into(), json!(view.now.seconds()));
+    shape.insert("agents".into(), agents.into());
+    shape.extend(more.map(|(key, value)| (key.to_owned(), value)));
+    shape.into()
+}
+
+/// `row` with the counts of the agent.
+fn with_counts(mut row: Json, agent: &AgentView) -> Json {
+    let counts = &agent.counts;
+    for (key, count) in [
+        ("releases", counts.releases),
+        ("missed", counts.missed),
+        ("stalled", counts.stalled),
+        ("skipped", counts.skipped),
+        ("faults", counts.faults),
+        ("panics", counts.panics),
+        ("hangs", counts.hangs),
+        ("restarts", counts.restarts),
+    ] {
+        row[key] = count.into();
+    }
+    row
+}
+
+fn ls_agent(agent: &AgentView) -> Json {
+    let row = json!({
+        "name": agent.name, "kind": agent.kind, "state": agent.state.name(), "executor": agent.executor,
+        "asked": agent.asked, "granted": agent.granted, "period_s": agent.period.map(Duration::seconds),
+        "deadline_s": agent.deadline.seconds(), "last_death": agent.last_death,
+        "params": table_to_json(&agent.params),
+    });
+    with_counts(row, agent)
+}
+
+fn top_agent(agent: &AgentView) -> Json {
+    let row = json!({
+        "name": agent.name, "state": agent.state.name(), "executor": agent.executor, "asked": agent.asked,
+        "granted": agent.granted, "exec": figure("exec", &agent.exec),
+        "jitter": figure("jitter", &agent.jitter), "response": figure("response", &agent.response),
+    });
+    with_counts(row, agent)
+}
+
+fn graph_agent(agent: &AgentView) -> Json {
+    json!({
+        "name": agent.name, "kind": agent.kind, "doc": agent.doc, "executor": agent.executor,
+        "ports": agent.ports.iter().map(graph_port).collect::<Vec<_>>(),
+    })
+}
+
+fn graph_port(port: &PortView) -> Json {
+    let direction = match port.direction {
+        Direction::Input => "input",
+        Direction::Output => "output",
+        Direction::Service => "service",
+        Direction::Client => "client",
+    };
+    json!({
+        "name": port.name, "doc": port.doc, "direction": direction, "message": port.message, "sent": port.sent,
+    })
+}
+
+fn graph_wire(wire: &WireView) -> Json {
+    json!({
+        "from": wire.from, "to": wire.to, "message": wire.message, "depth": wire.depth,
+        "overload": wire.overload.name(), "filter": filter(&wire.filter), "sent": wire.sent,
+        "taken": wire.taken, "dropped": wire.dropped, "refused": wire.refused, "expired": wire.expired,
+    })
+}
+
+fn filter(filter: &Filter) -> Json {
+    json!({
+        "category": filter.category.map(|category| category.name()),
+        "priority": filter.least_priority.0.name(), "marker": filter.marker,
+        "recipient": filter.recipient.map(|agent| agent.0), "every": filter.every.max(1),
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_figure_of_nothing_shows_no_numbers() {
+        let empty = figure("exec", &Figure::default());
+        assert!(empty["n"] == 0 && empty["max"].is_null() && empty["p50"].is_null());
+        let one = Figure { n: 1, max: 5.0, ..Figure::default() };
+        assert_eq!(figure("exec", &one)["max"], 5.0);
+    }
+
+    #[test]
+    fn a_plan_is_read_as_it_was_written() {
+        let mut agent = AgentPlan { name: "a".into(), kind: "b".into(), ..AgentPlan::default() };
+        agent.params.set("side", types::value::Value::from("far left"));
+        let wire = WirePlan { depth: Some(3), ..WirePlan::new("a.out", "c.in") };
+        let json = plan("lab", std::slice::from_ref(&agent), std::slice::from_ref(&wire));
+        assert_eq!(read_plan(&json), Ok((vec![agent], vec![wire])));
+        assert!(read_plan(&json!({"requests": [["quit"]]})).is_err() && read_plan(&json!(3)).is_err());
+    }
+}

@@ -1,0 +1,61 @@
+//! One grammar for the command line, `[[at]]` and scripts: a request in words, and back.
+//!
+//! ```text
+//! add NAME is KIND [robot=…] [period=…] [on=a,b] [deadline=…] … [KEY=VALUE…]
+//! remove NAME            restart NAME           replace NAME is KIND [KEY=VALUE…]
+//! wire FROM TO [depth=N] [overload=POLICY] [every=N] [priority=LEAST] [marker=N] [category=…] [recipient=N]
+//! unwire FROM TO         set NAME KEY=VALUE…    fault TARGET KIND
+//! send PORT cdr=HEX      quit
+//! ```
+//!
+//! Several requests with a `;` between them are one: they are done together or not at all. So is a `set` of several keys.
+
+mod line;
+mod read;
+mod value;
+mod write;
+
+pub use line::{join, split};
+pub(crate) use read::Pairs;
+pub use read::parse;
+pub use value::{read_value, write_value};
+pub use write::words_of;
+
+/// A command, how it is written, and what it does.
+#[derive(Clone, Copy, Debug)]
+pub struct Usage {
+    /// Its first word.
+    pub verb: &'static str,
+    /// How it is written.
+    pub form: &'static str,
+    /// What it does.
+    pub does: &'static str,
+}
+
+const fn usage(verb: &'static str, form: &'static str, does: &'static str) -> Usage {
+    Usage { verb, form, does }
+}
+
+/// The requests that change a running system: what [`parse`] reads.
+pub const CHANGES: [Usage; 10] = [
+    usage("add", "add NAME is KIND [robot=…] [period=…] [on=…] [KEY=VALUE…]", "adds an agent"),
+    usage("remove", "remove NAME", "removes an agent and its wires"),
+    usage("restart", "restart NAME", "starts an agent anew"),
+    usage("replace", "replace NAME is KIND [KEY=VALUE…]", "puts another agent in the place of one"),
+    usage("wire", "wire FROM TO [depth=N] [overload=…] [every=N] [priority=…] [marker=N] [category=…]", "makes a wire"),
+    usage("unwire", "unwire FROM TO", "cuts a wire, when what is on it has arrived"),
+    usage("set", "set NAME KEY=VALUE…", "sets parameters, or the period, deadline or min_gap"),
+    usage("fault", "fault AGENT|OUTPUT KIND", "makes an agent or an output misbehave; \"ok\" ends it"),
+    usage("send", "send PORT cdr=HEX", "sends a message out of a port"),
+    usage("quit", "quit", "ends the run"),
+];
+
+/// What stands between requests that are done together or not at all.
+pub const AND: &str = ";";
+
+/// The keys of `wire`.
+pub(crate) const WIRE_KEYS: [&str; 7] =
+    ["depth", "overload", "every", "priority", "marker", "category", "recipient"];
+
+#[cfg(test)]
+mod tests;

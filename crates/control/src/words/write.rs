@@ -1,0 +1,82 @@
+//! From a request to words.
+
+use runtime::{AgentPlan, OnDeath, Request, WirePlan};
+use types::value::Table;
+use types::{Duration, Priority};
+
+use super::{AND, write_value};
+
+/// The words that [`parse`](super::parse) reads as this request. Requests of several within requests of several become one row:
+/// they are done together all the same.
+///
+/// A parameter with the name of a key of `add` (`period`, `on` …) cannot be said in words, nor in a system file.
+pub fn words_of(request: &Request) -> Vec<String> {
+    match request {
+        Request::Add(plan) => add(plan),
+        Request::Remove(agent) => words(["remove", agent]),
+        Request::Restart(agent) => words(["restart", agent]),
+        Request::Replace { agent, kind, params } => {
+            let mut out = words(["replace", agent, "is", kind]);
+            push_params(&mut out, params);
+            out
+        }
+        Request::Wire(plan) => wire(plan),
+        Request::Unwire { from, to } => words(["unwire", from, to]),
+        Request::Set { agent, key, value } => {
+            words(["set", agent, &format!("{key}={}", write_value(value))])
+        }
+        Request::Fault { target, fault } => words(["fault", target, fault.name()]),
+        Request::Send { port, cdr } => {
+            let digits: String = cdr.iter().map(|byte| format!("{byte:02x}")).collect();
+            words(["send", port, &format!("cdr={digits}")])
+        }
+        Request::Quit => words(["quit"]),
+        Request::All(requests) => {
+            let several: Vec<Vec<String>> = requests.iter().map(words_of).collect();
+            several.join(&AND.to_owned())
+        }
+    }
+}
+
+fn words<const N: usize>(words: [&str; N]) -> Vec<String> {
+    words.map(str::to_owned).into()
+}
+
+fn push(out: &mut Vec<String>, key: &str, value: Option<impl ToString>) {
+    out.extend(value.map(|value| format!("{key}={}", value.to_string())));
+}
+
+fn push_params(out: &mut Vec<String>, params: &Table) {
+    for row in params.rows() {
+        push(out, &row.key, Some(write_value(&row.entry.value)));
+    }
+}
+
+fn add(plan: &AgentPlan) -> Vec<String> {
+    let mut out = words(["add", &plan.name, "is", &plan.kind]);
+    push(&mut out, "robot", plan.robot.as_ref());
+    push(&mut out, "executor", plan.executor.as_ref());
+    push(&mut out, "period", plan.period);
+    push(&mut out, "period_range", plan.period_range.map(|(least, most)| format!("{least}..{most}")));
+    push(&mut out, "deadline", plan.deadline);
+    push(&mut out, "hang_after", plan.hang_after);
+    push(&mut out, "min_gap", (plan.min_gap != Duration::ZERO).then_some(plan.min_gap));
+    push(&mut out, "on", (!plan.on.is_empty()).then(|| plan.on.join(",")));
+    push(&mut out, "on_death", (plan.on_death == OnDeath::Leave).then_some("leave"));
+    push_params(&mut out, &plan.params);
+    out
+}
+
+fn wire(plan: &WirePlan) -> Vec<String> {
+    let mut out = words(["wire", &plan.from, &plan.to]);
+    let filter = &plan.filter;
+    let least = filter.least_priority.0;
+    push(&mut out, "depth", plan.depth);
+    push(&mut out, "overload", plan.overload.map(|policy| policy.name()));
+    push(&mut out, "every", (filter.every != 0).then_some(filter.every));
+    push(&mut out, "priority", (least != Priority::Low).then(|| least.name()));
+    push(&mut out, "marker", filter.marker);
+    push(&mut out, "category", filter.category.map(|category| category.name()));
+    push(&mut out, "recipient", filter.recipient.map(|agent| agent.0));
+    out
+}

@@ -1,0 +1,281 @@
+//! The last stage in front of a driver: latch, age limit, physical limits.
+
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
+
+use motion::limits::{Cuts, Limits};
+use types::Time;
+use types::messages::{Head, Twist};
+
+use crate::description::RobotDescription;
+use crate::driver::{Driver, DriverError, Listening, Polled, Sink};
+use crate::guard::{Authority, Contact, Guard, Policy, Reason, Refusal, Verdict};
+use crate::latch::{Cause, Latch};
+
+/// A number that the gate's thread counts up and anybody reads.
+#[derive(Debug, Default)]
+pub struct Count(AtomicU64);
+
+impl Count {
+    /// How many.
+    pub fn get(&self) -> u64 {
+        self.0.load(Ordering::Relaxed)
+    }
+
+    fn add(&self) {
+        // There is one writer; a plain load and store is cheaper than an atomic addition.
+        self.0.store(self.get() + 1, Ordering::Relaxed);
+    }
+}
+
+/// What happened at a gate. Nothing is lost in silence.
+#[derive(Debug, Default)]
+pub struct Counts {
+    /// Cycles.
+    pub cycles: Count,
+    /// Commands that came.
+    pub commands: Count,
+    /// Commands that were not finite.
+    pub not_finite: Count,
+    /// Commands that came while the latch was set, or that were made before its reset.
+    pub latched: Count,
+    /// Commands that were too old when they came, and motions that ended because no new command came.
+    pub stale: Count,
+    /// Commands that came while one of a higher authority was followed.
+    pub overruled: Count,
+    /// Cycles in which something of a command was cut.
+    pub clamped: Count,
+    /// Times that the bumper was pressed.
+    pub bumps: Count,
+    /// Times that the gate saw the latch set after it was clear.
+    pub latch_sets: Count,
+    /// Times that the hardware could not be reached.
+    pub failures: Count,
+    ended: AtomicBool,
+}
+
+impl Counts {
+    /// Whether nothing will ever come from the driver again: the end of a recording.
+    pub fn ended(&self) -> bool {
+        self.ended.load(Ordering::Relaxed)
+    }
+}
+
+/// Something worth a note.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Event {
+    /// The latch was found set.
+    LatchSet,
+    /// The latch was found clear again.
+    LatchCleared,
+    /// A motion ended because no new command came.
+    Stale,
+    /// A command was cut for the first time since one passed whole.
+    Clamped(Cuts),
+}
+
+/// What one cycle did.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Cycle {
+    /// What went to the wheels, and why.
+    pub verdict: Verdict,
+    /// What is worth a note.
+    pub event: Option<Event>,
+}
+
+/// A driver behind its gate. There is no other way to the driver.
+///
+/// Per cycle: [`poll`](Gate::poll), then [`command`](Gate::command) for what has come, then [`apply`](Gate::apply). Nothing in it
+/// allocates, waits for a lock or reads a clock. A gate that is dropped stops the wheels first.
+pub struct Gate {
+    driver: Box<dyn Driver>,
+    guard: Option<Guard>,
+    latch: Latch,
+    counts: Arc<Counts>,
+    pressed: u32,
+    bumper_latches: bool,
+    was_set: bool,
+    was_cut: bool,
+    last_seen: Time,
+}
+
+impl Gate {
+    /// Takes the driver for good.
+    pub fn new(driver: impl Driver + 'static, latch: Latch) -> Gate {
+        Gate::of(Box::new(driver), latch)
+    }
+
+    /// The same for a driver whose type is not known.
+    pub fn of(driver: Box<dyn Driver>, latch: Latch) -> Gate {
+        let guard = driver.describe().limits.map(|limits: Limits| Guard::new(limits, Policy::default()));
+        Gate {
+            driver,
+            guard,
+            latch,
+            counts: Arc::default(),
+            pressed: 0,
+            bumper_latches: true,
+            was_set: false,
+            was_cut: false,
+            last_seen: Time::ZERO,
+        }
+    }
+
+    /// What the robot is.
+    pub fn description(&self) -> &RobotDescription {
+        self.driver.describe()
+    }
+
+    /// Its latch.
+    pub fn latch(&self) -> &Latch {
+        &self.latch
+    }
+
+    /// Its counts, to be kept and read from any thread.
+    pub fn counts(&self) -> Arc<Counts> {
+        self.counts.clone()
+    }
+
+    /// Changes what can be set: limits, and whether a press of the bumper sets the latch.
+    pub fn set_policy(&mut self, policy: Policy, bumper_latches: bool) {
+        self.bumper_latches = bumper_latches;
+        if let Some(guard) = &mut self.guard {
+            guard.set_policy(policy);
+        }
+    }
+
+    /// Delivers the readings that are due. The driver has stopped by itself if the bumper was pressed; here the latch is set.
+    ///
+    /// # Errors
+    /// When the hardware cannot be reached; the latch is set then.
+    pub fn poll(
+        &mut self,
+        now: Time,
+        wanted: &Listening,
+        sink: &mut dyn Sink,
+    ) -> Result<Polled, DriverError> {
+        self.last_seen = now;
+        match self.driver.poll(now, wanted, sink) {
+            Ok(polled) => {
+                self.pressed = polled.pressed;
+                if polled.newly_pressed != 0 {
+                    self.counts.bumps.add();
+                    if self.bumper_latches {
+                        self.latch.set(Cause::Bumper, now);
+                    }
+                }
+                if polled.ended {
+                    self.counts.ended.store(true, Ordering::Relaxed);
+                }
+                Ok(polled)
+            }
+            Err(error) => {
+                self.counts.failures.add();
+                self.latch.set(Cause::Hardware, now);
+                Err(error)
+            }
+        }
+    }
+
+    /// Takes a command that was made at `stamp`. What does not pass is counted.
+    pub fn command(&mut self, now: Time, authority: Authority, stamp: Time, twist: Twist) {
+        let counts = &self.counts;
+        counts.commands.add();
+        let Some(guard) = &mut self.guard else { return };
+        match guard.offer(now, self.latch.state(), authority, stamp, twist) {
+            Ok(()) if guard.is_overruled(authority) => counts.overruled.add(),
+            Ok(()) => {}
+            Err(Refusal::NotFinite) => counts.not_finite.add(),
+            Err(Refusal::Latched | Refusal::BeforeReset) => counts.latched.add(),
+            Err(Refusal::Stale) => counts.stale.add(),
+        }
+    }
+
+    /// Turns the head, unless the latch is set, there is none, or the command is not finite.
+    ///
+    /// # Errors
+    /// When the hardware cannot be reached.
+    pub fn command_head(&mut self, now: Time, head: Head) -> Result<(), DriverError> {
+        self.counts.commands.add();
+        if self.latch.is_set() {
+            self.counts.latched.add();
+            return Ok(());
+        }
+        if !(head.pan.is_finite() && head.tilt.is_finite()) {
+            self.counts.not_finite.add();
+            return Ok(());
+        }
+        let Some(limits) = self.driver.describe().head else { return Ok(()) };
+        let within = Head {
+            pan: head.pan.clamp(-limits.pan_max, limits.pan_max),
+            tilt: head.tilt.clamp(-limits.tilt_max, limits.tilt_max),
+        };
+        if within != head {
+            self.counts.clamped.add();
+        }
+        self.driver.turn_head(now, within)
+    }
+
+    /// Decides and writes to the wheels.
+    ///
+    /// # Errors
+    /// When the hardware cannot be reached; the latch is set then, and the robot's own watchdog has to stop it.
+    pub fn apply(&mut self, now: Time) -> Result<Cycle, DriverError> {
+        self.last_seen = now;
+        self.counts.cycles.add();
+        let latch = self.latch.state();
+        let event = self.look_at_latch(latch.is_set());
+        let Some(guard) = &mut self.guard else {
+            let verdict = Verdict {
+                twist: Twist::ZERO,
+                reason: if latch.is_set() { Reason::Latched } else { Reason::Idle },
+            };
+            return Ok(Cycle { verdict, event });
+        };
+        let contact = Contact::of(self.pressed, self.driver.describe().bumper_sectors);
+        let verdict = guard.decide(now, latch, contact);
+        let event = event.or_else(|| self.look_at(verdict.reason));
+        self.driver.drive(now, verdict.twist).inspect_err(|_| {
+            self.counts.failures.add();
+            self.latch.set(Cause::Hardware, now);
+        })?;
+        Ok(Cycle { verdict, event })
+    }
+
+    fn look_at_latch(&mut self, is_set: bool) -> Option<Event> {
+        if is_set == self.was_set {
+            return None;
+        }
+        self.was_set = is_set;
+        if is_set {
+            self.counts.latch_sets.add();
+        }
+        Some(if is_set { Event::LatchSet } else { Event::LatchCleared })
+    }
+
+    fn look_at(&mut self, reason: Reason) -> Option<Event> {
+        match reason {
+            Reason::Stale => {
+                self.counts.stale.add();
+                Some(Event::Stale)
+            }
+            Reason::Followed(_, cuts) => {
+                let is_cut = !cuts.none();
+                let begins = is_cut && !self.was_cut;
+                self.was_cut = is_cut;
+                if is_cut {
+                    self.counts.clamped.add();
+                }
+                begins.then_some(Event::Clamped(cuts))
+            }
+            Reason::Idle | Reason::Latched => None,
+        }
+    }
+}
+
+impl Drop for Gate {
+    fn drop(&mut self) {
+        // Should this fail too, the robot's own watchdog is what is left.
+        let _ = self.driver.drive(self.last_seen, Twist::ZERO);
+    }
+}
