@@ -35,7 +35,9 @@ pub enum ClientError {
         help: String,
     },
     /// It speaks another version of the protocol.
-    #[error("the system speaks version {theirs} of the control protocol, this program version {VERSION}; use the program that started it")]
+    #[error(
+        "the system speaks version {theirs} of the control protocol, this program version {VERSION}; use the program that started it"
+    )]
     Version {
         /// Its version.
         theirs: Json,

@@ -13,9 +13,9 @@ use crate::json::{from_json, table_to_json};
 use crate::outbox::Outbox;
 use crate::protocol::{COMMANDS, Question};
 use crate::server::Hooks;
+use crate::shapes;
 use crate::taps::{Ear, Taps};
 use crate::words::{self, CHANGES, Pairs};
-use crate::shapes;
 
 /// How many decisions are shown when nobody says.
 const DECISIONS: usize = 10;
@@ -89,7 +89,8 @@ impl Commands {
     }
 
     fn why(&self, rest: &[String]) -> Answer {
-        let number = |word: &String| word.parse().map_err(|_| wrong_form("why", format!("\"{word}\" is no number")));
+        let number =
+            |word: &String| word.parse().map_err(|_| wrong_form("why", format!("\"{word}\" is no number")));
         match rest {
             [] => self.hooks.why(DECISIONS),
             [word] => self.hooks.why(number(word)?),
@@ -129,7 +130,8 @@ impl Commands {
         let mut pairs = Pairs::read("tap", rest)?;
         let every = pairs.number::<u64>("every")?.unwrap_or(1).max(1);
         pairs.finish("tap", &["every"])?;
-        let ear = Ear::Client { client: asker.client, outbox: asker.outbox.clone(), every, heard: 0, lost: 0 };
+        let ear =
+            Ear::Client { client: asker.client, outbox: asker.outbox.clone(), every, heard: 0, lost: 0 };
         let definition = self.taps.listen(port, ear)?;
         Ok(json!({"port": port, "message": definition.name, "definition": definition.text()}))
     }
@@ -171,7 +173,13 @@ impl Commands {
         let client = self.client_of(service)?;
         let question = self.encode(&client, &message_of("call", &rest, message)?)?;
 
-        let calling = self.calling.lock().unwrap_or_else(PoisonError::into_inner).entry(service.to_owned()).or_default().clone();
+        let calling = self
+            .calling
+            .lock()
+            .unwrap_or_else(PoisonError::into_inner)
+            .entry(service.to_owned())
+            .or_default()
+            .clone();
         let mut late = calling.lock().unwrap_or_else(PoisonError::into_inner);
         self.settle(&mut late, service)?;
         let (sender, answer) = sync_channel(1);
@@ -179,10 +187,15 @@ impl Commands {
         let sent = self.control.request(Request::Send { port: client, cdr: question });
         let heard = sent.map(|()| answer.recv_timeout(Duration::from_nanos(within.0.max(0) as u64)));
         if let Ok(Err(_)) = heard {
-            #[expect(clippy::disallowed_methods, reason = "how long a client waits is a matter of the host's clock")]
+            #[expect(
+                clippy::disallowed_methods,
+                reason = "how long a client waits is a matter of the host's clock"
+            )]
             let since = Instant::now();
             *late = Some(Late { answer, since });
-            return Err(Refusal::new(format!("{service} did not answer within {within}")).help(look_at(service)));
+            return Err(
+                Refusal::new(format!("{service} did not answer within {within}")).help(look_at(service))
+            );
         }
         self.taps.end_call(service);
         match heard? {

@@ -20,7 +20,9 @@ pub enum FolderError {
         cause: io::Error,
     },
     /// It belongs to somebody else, or others may look into it.
-    #[error("the run folder {path} is not safe: {why}; remove it, or set XDG_RUNTIME_DIR to a folder of your own")]
+    #[error(
+        "the run folder {path} is not safe: {why}; remove it, or set XDG_RUNTIME_DIR to a folder of your own"
+    )]
     Unsafe {
         /// The folder.
         path: PathBuf,
@@ -107,14 +109,19 @@ impl RunFolder {
                 found.push(path);
             }
         }
-        found.sort();
+        // By name: the end of a file name would put "lab-2" before "lab".
+        found.sort_by(|a, b| a.file_stem().cmp(&b.file_stem()));
         Ok(found)
     }
 
     /// Keeps others from making or clearing away sockets until the file is dropped.
     pub(crate) fn lock(&self) -> io::Result<File> {
-        let file =
-            File::options().create(true).truncate(false).write(true).mode(0o600).open(self.path.join(LOCK))?;
+        let file = File::options()
+            .create(true)
+            .truncate(false)
+            .write(true)
+            .mode(0o600)
+            .open(self.path.join(LOCK))?;
         rustix::fs::flock(&file, FlockOperation::LockExclusive)?;
         Ok(file)
     }

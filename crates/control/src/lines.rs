@@ -39,7 +39,11 @@ impl<R: Read> Lines<R> {
                 let mut line = core::mem::replace(&mut self.waiting, rest);
                 line.pop();
                 self.searched = 0;
-                return if line.len() > self.longest { Err(NoLine::TooLong(self.longest)) } else { Ok(Some(line)) };
+                return if line.len() > self.longest {
+                    Err(NoLine::TooLong(self.longest))
+                } else {
+                    Ok(Some(line))
+                };
             }
             self.searched = self.waiting.len();
             if self.searched > self.longest {

@@ -127,7 +127,9 @@ pub(crate) fn message_event(
         "category": header.category.name(), "priority": header.priority.name(),
     });
     let unreadable = |what: &str| json!({"unreadable": what, "bytes": heard.cdr.len()});
-    let event = |message: Json| json!({"event": "message", "port": port, "header": header, "message": message}).to_string();
+    let event = |message: Json| {
+        json!({"event": "message", "port": port, "header": header, "message": message}).to_string()
+    };
     let line = event(message.unwrap_or_else(|what| unreadable(&what)));
     if line.len() <= LONGEST_LINE { line } else { event(unreadable("longer than a line may be")) }
 }
@@ -150,6 +152,11 @@ mod tests {
         }
         let one_text = br#"{"id":7,"do":"set a 'b=c d'"}"#;
         assert_eq!(Question::read(one_text).unwrap().words, words);
+    }
+
+    #[test]
+    fn the_page_shows_the_news_of_what_was_lost() {
+        assert!(include_str!("protocol.md").contains(&lost_event("source.out", 12)));
     }
 
     #[test]

@@ -184,8 +184,15 @@ impl Server {
             ending: AtomicBool::new(false),
         });
         let (here, all_gone) = sync_channel(0);
-        let mut server =
-            Server { shared: shared.clone(), name, path, inode, listener: listener.clone(), threads: Vec::new(), all_gone };
+        let mut server = Server {
+            shared: shared.clone(),
+            name,
+            path,
+            inode,
+            listener: listener.clone(),
+            threads: Vec::new(),
+            all_gone,
+        };
         let pump = Builder::new().name("control-taps".into()).spawn(move || taps.pump());
         server.threads.push(pump.map_err(ServerError::NoThread)?);
         let accept = Builder::new().name("control".into()).spawn(move || accept(&listener, &shared, here));
@@ -283,7 +290,12 @@ fn accept(listener: &UnixListener, shared: &Arc<Shared>, here: SyncSender<()>) {
     }
 }
 
-fn welcome(number: u64, mut stream: UnixStream, shared: &Arc<Shared>, here: &SyncSender<()>) -> io::Result<()> {
+fn welcome(
+    number: u64,
+    mut stream: UnixStream,
+    shared: &Arc<Shared>,
+    here: &SyncSender<()>,
+) -> io::Result<()> {
     stream.set_write_timeout(Some(shared.limits.patience))?;
     // The first line always fits into the socket's own buffer.
     writeln!(stream, "{}", shared.hello)?;
@@ -295,13 +307,26 @@ fn welcome(number: u64, mut stream: UnixStream, shared: &Arc<Shared>, here: &Syn
     shared.clients().insert(number, stream.try_clone()?);
     let (mine, here) = (shared.clone(), here.clone());
     let spawned = Builder::new().name(format!("control-{number}")).spawn(move || {
+        let _present = Present { client: number, shared: &mine, _here: here };
         serve(number, stream, &mine);
-        drop(here);
     });
     if spawned.is_err() {
         shared.clients().remove(&number);
     }
     spawned.map(drop)
+}
+
+/// A client that has a place: it is given back when the client's thread ends, however it does.
+struct Present<'a> {
+    client: u64,
+    shared: &'a Shared,
+    _here: SyncSender<()>,
+}
+
+impl Drop for Present<'_> {
+    fn drop(&mut self) {
+        self.shared.clients().remove(&self.client);
+    }
 }
 
 /// Serves one client to its end.
@@ -316,14 +341,27 @@ fn serve(client: u64, stream: UnixStream, shared: &Arc<Shared>) {
         // It came too late to be told that nothing more is answered.
         let _ = stream.shutdown(Shutdown::Read);
     }
+    let leaving = Leaving { client, outbox, shared };
     if let Ok(writer) = writer {
         read(stream, &asker, shared);
-        shared.taps.forget(client);
-        outbox.close();
+        drop(leaving);
         // It ends when all is written, or nobody reads.
         let _ = writer.join();
     }
-    shared.clients().remove(&client);
+}
+
+/// Takes a client out of everything that knows it, also when a hook panicked.
+struct Leaving<'a> {
+    client: u64,
+    outbox: Arc<Outbox>,
+    shared: &'a Shared,
+}
+
+impl Drop for Leaving<'_> {
+    fn drop(&mut self) {
+        self.shared.taps.forget(self.client);
+        self.outbox.close();
+    }
 }
 
 /// Answers questions until there are no more, or nobody takes the answers.

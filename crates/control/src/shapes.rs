@@ -66,8 +66,9 @@ pub fn read_plan(json: &Json) -> Result<(Vec<AgentPlan>, Vec<WirePlan>), Refusal
     let wrong = || Refusal::new("this is no plan of a running system");
     let (mut agents, mut wires) = (Vec::new(), Vec::new());
     for request in json["requests"].as_array().ok_or_else(wrong)? {
-        let words: Option<Vec<String>> =
-            request.as_array().and_then(|row| row.iter().map(|word| word.as_str().map(str::to_owned)).collect());
+        let words: Option<Vec<String>> = request
+            .as_array()
+            .and_then(|row| row.iter().map(|word| word.as_str().map(str::to_owned)).collect());
         match words::parse(&words.ok_or_else(wrong)?)? {
             Request::Add(agent) => agents.push(agent),
             Request::Wire(wire) => wires.push(wire),

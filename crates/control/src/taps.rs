@@ -95,7 +95,9 @@ impl Taps {
     /// Ends listening of a client to an output. Says whether it did listen.
     pub(crate) fn leave(&self, port: &str, client: u64) -> bool {
         let mut state = self.state();
-        let Some(at) = state.listened.iter().position(|listened| listened.tap.name() == port) else { return false };
+        let Some(at) = state.listened.iter().position(|listened| listened.tap.name() == port) else {
+            return false;
+        };
         let did = state.listened[at].has_client(client);
         state.listened[at].ears.retain(|ear| !ear.is_of(client));
         self.sweep(&mut state);
@@ -195,12 +197,12 @@ impl Taps {
                         let message = self.hooks.decode(tap.definition(), &heard.cdr);
                         message_event(tap.name(), heard, message, |id| self.name(names, id)).into()
                     });
-                    if *lost > 0 && outbox.offer(&lost_event(tap.name(), *lost).into()) {
-                        *lost = 0;
-                    }
-                    if *lost > 0 || !outbox.offer(line) {
-                        *lost += 1;
-                    }
+                    // What was lost is told together with the next message that has room.
+                    let told = match *lost {
+                        0 => outbox.offer(line),
+                        n => outbox.offer(&format!("{}\n{line}", lost_event(tap.name(), n)).into()),
+                    };
+                    *lost = if told { 0 } else { *lost + 1 };
                 }
                 Ear::Call(answer) => {
                     if heard.header.category == Category::Answer && heard.header.marker == 0 {

@@ -11,6 +11,7 @@
 //! | [`motion`] | two intensity pictures | mask, number and centre of the changed pixels |
 //! | [`target`] | blob and camera | bearing, elevation, share of the picture |
 //! | [`sonar`] | ring of ranges | filtered ranges, risk per direction |
+//! | [`local_map`] | echoes while the robot moves | where something is around it |
 //! | [`laser`] | laser scan | ring of ranges around the robot |
 #![forbid(unsafe_code)]
 
@@ -18,6 +19,7 @@ pub mod blobs;
 pub mod colour;
 pub mod edges;
 pub mod laser;
+pub mod local_map;
 pub mod motion;
 pub mod picture;
 pub mod sonar;

@@ -42,7 +42,11 @@ pub const CHANGES: [Usage; 10] = [
     usage("remove", "remove NAME", "removes an agent and its wires"),
     usage("restart", "restart NAME", "starts an agent anew"),
     usage("replace", "replace NAME is KIND [KEY=VALUE…]", "puts another agent in the place of one"),
-    usage("wire", "wire FROM TO [depth=N] [overload=…] [every=N] [priority=…] [marker=N] [category=…]", "makes a wire"),
+    usage(
+        "wire",
+        "wire FROM TO [depth=N] [overload=…] [every=N] [priority=…] [marker=N] [category=…]",
+        "makes a wire",
+    ),
     usage("unwire", "unwire FROM TO", "cuts a wire, when what is on it has arrived"),
     usage("set", "set NAME KEY=VALUE…", "sets parameters, or the period, deadline or min_gap"),
     usage("fault", "fault AGENT|OUTPUT KIND", "makes an agent or an output misbehave; \"ok\" ends it"),

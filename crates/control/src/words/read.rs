@@ -111,7 +111,11 @@ fn read_add(words: &[String]) -> Read<AgentPlan> {
     plan.hang_after = pairs.span("hang_after")?;
     plan.min_gap = pairs.span("min_gap")?.unwrap_or_default();
     if let Some(inputs) = pairs.take("on") {
-        plan.on = inputs.split(',').filter(|input| !input.is_empty()).map(|input| input.trim().to_owned()).collect();
+        plan.on = inputs
+            .split(',')
+            .filter(|input| !input.is_empty())
+            .map(|input| input.trim().to_owned())
+            .collect();
     }
     if let Some(word) = pairs.take("on_death") {
         plan.on_death = match word {
@@ -174,7 +178,9 @@ fn read_set(words: &[String]) -> Read<Request> {
 fn read_send(words: &[String]) -> Read<Request> {
     let ([port], rest) = begin("send", words)?;
     let mut pairs = Pairs::read("send", rest)?;
-    let digits = pairs.take("cdr").ok_or_else(|| wrong_form("send", format!("nothing is said of what to send out of {port}")))?;
+    let digits = pairs
+        .take("cdr")
+        .ok_or_else(|| wrong_form("send", format!("nothing is said of what to send out of {port}")))?;
     pairs.finish("send", &["cdr"])?;
     let cdr = read_hex(digits).ok_or_else(|| Refusal::new("cdr must be hexadecimal digits, two a byte"))?;
     Ok(Request::Send { port, cdr })
@@ -217,7 +223,8 @@ impl<'a> Pairs<'a> {
 
     pub(crate) fn number<N: FromStr>(&mut self, key: &str) -> Read<Option<N>> {
         let Some(text) = self.take(key) else { return Ok(None) };
-        let wrong = |_| Refusal::new(format!("{key} must be a whole number that is not negative, not \"{text}\""));
+        let wrong =
+            |_| Refusal::new(format!("{key} must be a whole number that is not negative, not \"{text}\""));
         text.parse().map(Some).map_err(wrong)
     }
 
@@ -230,9 +237,7 @@ impl<'a> Pairs<'a> {
     pub(crate) fn finish(self, verb: &str, known: &[&str]) -> Read<()> {
         match self.pairs.first() {
             None => Ok(()),
-            Some((key, _)) => {
-                Err(Refusal::unknown(&format!("option of {verb}"), key, known.iter().copied()))
-            }
+            Some((key, _)) => Err(Refusal::unknown(&format!("option of {verb}"), key, known.iter().copied())),
         }
     }
 
@@ -245,4 +250,3 @@ impl<'a> Pairs<'a> {
         Ok(table)
     }
 }
-

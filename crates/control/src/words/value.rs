@@ -205,10 +205,15 @@ mod tests {
 
     #[test]
     fn what_does_not_end_is_refused_with_its_place() {
-        for word in ["[", "[1", "[1,,2]", "{a}", "{a = }", "{a = 1, a = 2}", "\"a", "\"\\x\"", "[1] 2", "\"\\ud800\""] {
+        for word in
+            ["[", "[1", "[1,,2]", "{a}", "{a = }", "{a = 1, a = 2}", "\"a", "\"\\x\"", "[1] 2", "\"\\ud800\""]
+        {
             assert!(read_value(word).is_err(), "{word}");
         }
         let deep = "[".repeat(100_000);
-        assert!(read_value(&deep).unwrap_err().what.contains("nested"), "a deep value must not break the stack");
+        assert!(
+            read_value(&deep).unwrap_err().what.contains("nested"),
+            "a deep value must not break the stack"
+        );
     }
 }

@@ -22,9 +22,7 @@ pub fn words_of(request: &Request) -> Vec<String> {
         }
         Request::Wire(plan) => wire(plan),
         Request::Unwire { from, to } => words(["unwire", from, to]),
-        Request::Set { agent, key, value } => {
-            words(["set", agent, &format!("{key}={}", write_value(value))])
-        }
+        Request::Set { agent, key, value } => words(["set", agent, &format!("{key}={}", write_value(value))]),
         Request::Fault { target, fault } => words(["fault", target, fault.name()]),
         Request::Send { port, cdr } => {
             let digits: String = cdr.iter().map(|byte| format!("{byte:02x}")).collect();

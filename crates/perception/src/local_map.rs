@@ -1,0 +1,347 @@
+//! What is around the robot, from the echoes of a ring of sonars while it moves: evidence on a fine grid.
+//!
+//! In plain words: a sonar tells how far the nearest thing in its cone is, but not where in the cone. Between two neighbouring
+//! sonars on a rim lies a strip that neither hears, and a smooth face that is met obliquely is silent. So one reading alone
+//! knows little. The readings of the last seconds, each put where the robot was when it was made, know much more:
+//! a corner is where the arcs of many echoes cross, a door is where an echo came from behind it, and a thing that cannot be heard just
+//! now is where it was.
+//!
+//! How it works, for each echo at distance r from its sensor:
+//!
+//! | cells | evidence | why |
+//! |---|---|---|
+//! | nearer than r by more than the noise, well inside the cone | less | the echo would have come from there |
+//! | on the arc at r, some of them surely occupied already | more, for those alone | they explain the echo |
+//! | on the arc at r, else | more, for all | it came from one of them |
+//!
+//! Near echoes count more than far ones, because their arcs are short. Silence says nothing. (Free space and evidence on a grid: Moravec
+//! and Elfes 1985. One echo one cause: the "mutual exclusion" of Konolige 1997.)
+
+use libm::{cos, floor, sin};
+use types::{Duration, Point, Pose, Time};
+
+/// Side of a cell (m). Half the reach of what two readings of one thing differ by, at 1 m.
+pub const CELL: f64 = 0.05;
+/// Cells on a side of the map; a map is 6.4 m wide and moves with the robot.
+const SIDE: i32 = 128;
+/// Evidence is kept within these: a thing that comes where it was free, or goes, is believed after two or three readings.
+const EVIDENCE: (i8, i8) = (-2, 6);
+/// From this evidence on a cell explains an echo: it was heard from nearby, or often.
+const SURE: i8 = 4;
+/// The part of a cone on which an echo is put, and the part in which it says that nothing is nearer: at the edges of a cone echoes are faint.
+const ARC: f64 = 0.95;
+const INSIDE: f64 = 0.8;
+
+/// What is known of the sensors, and how long to remember.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct MapParams {
+    /// From the robot's centre to the sensors, which is also the radius of its body (m). Default 0.225.
+    pub rim: f64,
+    /// Half the opening of a cone (rad). Default 15°, that of a common ultrasonic transducer.
+    pub cone: f64,
+    /// Echoes nearer to the sensor than this are told as this (m). Default 0.15.
+    pub shortest: f64,
+    /// Echoes farther than this from the robot's centre are not put into the map (m). Default 2: beyond, an arc is longer than a door is wide.
+    pub reach: f64,
+    /// An echo this much behind a cell says that the cell is free (m). Default 0.12: three standard deviations of a range, and a cell.
+    pub behind: f64,
+    /// How long a cell stays occupied that is not heard again. Default 30 s: so long may a robot turn about in a corner, and on so short a way
+    /// the odometry drifts by centimetres.
+    pub keep: Duration,
+}
+
+impl Default for MapParams {
+    fn default() -> MapParams {
+        MapParams {
+            rim: 0.225,
+            cone: 15.0 * types::geometry::PI / 180.0,
+            shortest: 0.15,
+            reach: 2.0,
+            behind: 0.12,
+            keep: Duration::secs(30),
+        }
+    }
+}
+
+/// A cell of the floor. The map is a torus: `tile` says which of the many places that share this memory it speaks of.
+#[derive(Clone, Copy, Debug, Default)]
+struct Cell {
+    heard: i32,
+    tile: (i8, i8),
+    evidence: i8,
+}
+
+/// The surroundings of a robot in the frame of its odometry.
+#[derive(Clone, Debug)]
+pub struct LocalMap {
+    params: MapParams,
+    cells: Box<[Cell]>,
+}
+
+impl Default for LocalMap {
+    fn default() -> LocalMap {
+        LocalMap::new(MapParams::default())
+    }
+}
+
+impl LocalMap {
+    /// A map that knows nothing. The memory for all of it is taken here.
+    pub fn new(params: MapParams) -> LocalMap {
+        LocalMap { params, cells: vec![Cell::default(); (SIDE * SIDE) as usize].into_boxed_slice() }
+    }
+
+    /// Changes the parameters; what was heard is kept.
+    pub fn set_params(&mut self, params: MapParams) {
+        self.params = params;
+    }
+
+    /// Forgets everything.
+    pub fn reset(&mut self) {
+        self.cells.fill(Cell::default());
+    }
+
+    /// Takes over a reading that was made at `pose`: bearing (rad) and distance from the robot's centre (m) of each echo. Directions
+    /// without an echo are left out by the caller.
+    pub fn update(&mut self, echoes: impl Iterator<Item = (f64, f64)> + Clone, pose: Pose, now: Time) {
+        let tick = ticks(now);
+        let heard = echoes.filter(|(bearing, range)| bearing.is_finite() && range.is_finite());
+        for (bearing, range) in heard.clone() {
+            self.clear_cone(Sensor::new(&self.params, pose, bearing), range - self.params.rim);
+        }
+        let reach = self.params.reach;
+        for (bearing, range) in heard.filter(|(_, range)| *range <= reach) {
+            self.put(Sensor::new(&self.params, pose, bearing), (range - self.params.rim).max(0.0), tick);
+        }
+        self.clear_body(pose);
+    }
+
+    /// The middles of the occupied cells within `reach` (m) of the robot, in its frame; `reach` is at most half of the map's width.
+    pub fn around(&self, pose: Pose, reach: f64, now: Time) -> impl Iterator<Item = Point> + Clone + '_ {
+        let reach = reach.clamp(0.0, f64::from(SIDE / 2 - 1) * CELL);
+        let ((x, y), span) = (index(pose.position()), floor(reach / CELL) as i32);
+        let oldest = ticks(now).saturating_sub(ticks(Time::ZERO + self.params.keep));
+        let (s, c) = (sin(pose.heading), cos(pose.heading));
+        (y - span..=y + span)
+            .flat_map(move |iy| (x - span..=x + span).map(move |ix| (ix, iy)))
+            .filter(move |&(ix, iy)| {
+                let cell = self.cells[slot(ix, iy)];
+                cell.evidence > 0 && cell.heard >= oldest && cell.tile == tile(ix, iy)
+            })
+            .map(move |(ix, iy)| {
+                let off = middle(ix, iy) - pose.position();
+                Point::new(c * off.x + s * off.y, c * off.y - s * off.x)
+            })
+            .filter(move |point| point.norm() <= reach)
+    }
+
+    /// Less evidence for what is nearer than an echo at `range` (m) from the sensor.
+    fn clear_cone(&mut self, sensor: Sensor, range: f64) {
+        let free = (range - self.params.behind).min(self.params.reach);
+        // At its shortest range a sensor tells nothing of what is nearer.
+        if range <= self.params.shortest + self.params.behind {
+            return;
+        }
+        let mut away = CELL / 2.0;
+        while away < free {
+            let steps = floor(INSIDE * self.params.cone * away / CELL) as i32;
+            for step in -steps..=steps {
+                let cell = self.cell(sensor.point(away, f64::from(step) * CELL));
+                cell.evidence = (cell.evidence - 1).max(EVIDENCE.0);
+            }
+            away += CELL;
+        }
+    }
+
+    /// More evidence for that from which an echo at `range` (m) from the sensor came.
+    fn put(&mut self, sensor: Sensor, range: f64, tick: i32) {
+        let half = ARC * self.params.cone;
+        let steps = libm::ceil(half * range / (0.8 * CELL)).max(1.0) as i32;
+        let arc = (-steps..=steps).map(|step| half * f64::from(step) / f64::from(steps));
+        let at_shortest = range <= self.params.shortest + CELL / 2.0;
+        let nearest = if at_shortest { 0.0 } else { range - CELL };
+        let mut explained = false;
+        for angle in arc.clone() {
+            let mut away = nearest;
+            while away <= range + 1.01 * CELL {
+                let cell = self.cell(sensor.turned(away, angle));
+                if cell.evidence >= SURE {
+                    explained = true;
+                    cell.heard = tick;
+                    cell.evidence = (cell.evidence + 1).min(EVIDENCE.1);
+                }
+                away += CELL;
+            }
+        }
+        if explained {
+            return;
+        }
+        let gain = if range < 0.6 {
+            3
+        } else if range < 1.2 {
+            2
+        } else {
+            1
+        };
+        for angle in arc {
+            let cell = self.cell(sensor.turned(range, angle));
+            cell.evidence = (cell.evidence + gain).min(EVIDENCE.1);
+            cell.heard = tick;
+        }
+    }
+
+    /// Where the body is nothing else can be.
+    fn clear_body(&mut self, pose: Pose) {
+        let inner = self.params.rim - CELL;
+        let ((x, y), span) = (index(pose.position()), floor(inner / CELL) as i32);
+        for iy in y - span..=y + span {
+            for ix in x - span..=x + span {
+                let middle = middle(ix, iy);
+                if middle.distance(pose.position()) <= inner {
+                    self.cell(middle).evidence = EVIDENCE.0;
+                }
+            }
+        }
+    }
+
+    /// The cell of a point, emptied first if its memory still speaks of another place.
+    fn cell(&mut self, point: Point) -> &mut Cell {
+        let (ix, iy) = index(point);
+        let cell = &mut self.cells[slot(ix, iy)];
+        if cell.tile != tile(ix, iy) {
+            *cell = Cell { tile: tile(ix, iy), ..Cell::default() };
+        }
+        cell
+    }
+}
+
+/// A sensor on the rim in the frame of the map.
+#[derive(Clone, Copy)]
+struct Sensor {
+    origin: Point,
+    axis: Point,
+}
+
+impl Sensor {
+    fn new(params: &MapParams, pose: Pose, bearing: f64) -> Sensor {
+        let axis = Point::polar(1.0, pose.heading + bearing);
+        Sensor { origin: pose.position() + axis * params.rim, axis }
+    }
+
+    /// The point `along` its axis and `across` it to the left (m).
+    fn point(self, along: f64, across: f64) -> Point {
+        self.origin + self.axis * along + Point::new(-self.axis.y, self.axis.x) * across
+    }
+
+    /// The point at `range` (m), `angle` (rad) to the left of its axis.
+    fn turned(self, range: f64, angle: f64) -> Point {
+        self.point(range * cos(angle), range * sin(angle))
+    }
+}
+
+/// Time in tenths of a second.
+fn ticks(time: Time) -> i32 {
+    (time.seconds() * 10.0) as i32
+}
+
+fn index(point: Point) -> (i32, i32) {
+    (floor(point.x / CELL) as i32, floor(point.y / CELL) as i32)
+}
+
+fn middle(ix: i32, iy: i32) -> Point {
+    Point::new((f64::from(ix) + 0.5) * CELL, (f64::from(iy) + 0.5) * CELL)
+}
+
+fn slot(ix: i32, iy: i32) -> usize {
+    (iy.rem_euclid(SIDE) * SIDE + ix.rem_euclid(SIDE)) as usize
+}
+
+fn tile(ix: i32, iy: i32) -> (i8, i8) {
+    (ix.div_euclid(SIDE) as i8, iy.div_euclid(SIDE) as i8)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use types::geometry::PI;
+
+    fn at(seconds: f64) -> Time {
+        Time::from_seconds(seconds)
+    }
+
+    fn nearest(map: &LocalMap, pose: Pose, now: f64) -> Point {
+        let far = Point::new(f64::INFINITY, 0.0);
+        map.around(pose, 2.0, at(now)).fold(far, |best, p| if p.norm() < best.norm() { p } else { best })
+    }
+
+    fn hear(map: &mut LocalMap, echoes: &[(f64, f64)], pose: Pose, now: f64) {
+        map.update(echoes.iter().copied(), pose, at(now));
+    }
+
+    #[test]
+    fn a_thing_that_is_not_heard_any_more_is_still_where_it_was_until_it_is_too_old() {
+        let mut map = LocalMap::default();
+        hear(&mut map, &[(0.0, 1.0)], Pose::default(), 0.0);
+        let later = Pose::new(0.4, 0.0, PI / 2.0);
+        hear(&mut map, &[], later, 1.0);
+        let point = nearest(&map, later, 1.0);
+        assert!((point.norm() - 0.6).abs() < 0.05 && (point.bearing() + PI / 2.0).abs() < 0.3, "{point:?}");
+        assert_eq!(nearest(&map, later, 30.2).norm(), f64::INFINITY);
+    }
+
+    #[test]
+    fn an_echo_from_behind_takes_a_thing_away_and_silence_does_not() {
+        let mut map = LocalMap::default();
+        hear(&mut map, &[(0.0, 1.0)], Pose::default(), 0.0);
+        hear(&mut map, &[], Pose::default(), 0.2);
+        assert!(nearest(&map, Pose::default(), 0.2).norm() < 1.05);
+        for _ in 0..2 {
+            hear(&mut map, &[(0.0, 1.6)], Pose::default(), 0.4);
+        }
+        // What is left of the arc lies at the edge of the cone.
+        assert!(nearest(&map, Pose::default(), 0.4).y.abs() > 0.1);
+    }
+
+    #[test]
+    fn the_shortest_echo_says_nothing_against_what_is_nearer() {
+        let mut map = LocalMap::default();
+        hear(&mut map, &[(0.0, 0.6)], Pose::default(), 0.0);
+        let near = Pose::new(0.3, 0.0, 0.0);
+        for i in 0..10 {
+            hear(&mut map, &[(0.0, 0.375)], near, 0.1 * f64::from(i));
+        }
+        assert!((nearest(&map, near, 1.0).norm() - 0.3).abs() < 0.05);
+    }
+
+    #[test]
+    fn arcs_from_two_places_leave_the_corner_where_they_cross() {
+        // A post half a metre to the left of the way, heard while the robot passes it by the sensors that look at it.
+        let post = Point::new(1.0, 0.5);
+        let mut map = LocalMap::default();
+        for i in 0..40 {
+            let pose = Pose::new(0.05 * f64::from(i), 0.0, 0.0);
+            let seen = pose.inverse().transform(post);
+            let echoes = (0..12).filter_map(|k| {
+                let bearing = f64::from(k) * PI / 6.0;
+                let off = seen - Point::polar(0.225, bearing);
+                let hears = types::geometry::wrap(off.bearing() - bearing).abs() < PI / 12.0;
+                Some((bearing, if hears { 0.225 + off.norm() } else { 4.0 }))
+            });
+            map.update(echoes, pose, at(0.2 * f64::from(i)));
+        }
+        let end = Pose::new(2.0, 0.0, 0.0);
+        let places: Vec<Point> = map.around(end, 2.0, at(8.0)).map(|p| end.transform(p)).collect();
+        assert!(places.iter().any(|p| p.distance(post) < 0.08), "{places:?}");
+        assert!(places.iter().all(|p| p.distance(post) < 0.3), "{places:?}");
+    }
+
+    #[test]
+    fn what_is_left_behind_does_not_come_back_a_maps_width_on() {
+        let mut map = LocalMap::default();
+        hear(&mut map, &[(0.0, 1.0)], Pose::default(), 0.0);
+        let width = f64::from(SIDE) * CELL;
+        assert_eq!(nearest(&map, Pose::new(width, 0.0, 0.0), 0.0).norm(), f64::INFINITY);
+        hear(&mut map, &[(0.0, 1.0)], Pose::new(width, 0.0, 0.0), 0.0);
+        assert!(nearest(&map, Pose::new(width, 0.0, 0.0), 0.0).norm() < 1.05);
+        assert_eq!(nearest(&map, Pose::default(), 0.0).norm(), f64::INFINITY);
+    }
+}

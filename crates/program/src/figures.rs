@@ -1,0 +1,155 @@
+//! From a log to figures: where the robot went, how it moved, how long steps took, what it measured.
+
+mod scenery;
+mod trail;
+
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+
+use record::figure::{AgentTiming, Map, Periods, Picture, Series, Timing, Trajectory, Velocity, Waypoint};
+use record::log::Reader;
+use runtime::AgentView;
+use types::Point;
+
+pub(crate) use scenery::notes;
+use trail::{Seen, Trail};
+
+use crate::run::Samples;
+
+/// Dots in an inch of a PNG: what journals ask of line art at this size.
+const DOTS: f64 = 200.0;
+/// The part of a run that the figure of periods shows (s): a second or two, or the marks run into each other.
+const WINDOW: f64 = 2.0;
+
+/// Draws all that a log has to show into `folder`, and gives the files.
+pub(crate) fn of_log(log: &Path, folder: &Path, timing: Option<Timing>) -> Result<Vec<PathBuf>, String> {
+    let mut reader = Reader::open(log).map_err(|error| error.to_string())?;
+    let run = reader.run().cloned().unwrap_or_default();
+    let mut trail = Trail::new(&run);
+    while let Some(message) = reader.next_message().map_err(|error| error.to_string())? {
+        trail.take(&message);
+    }
+    std::fs::create_dir_all(folder).map_err(|error| format!("{} cannot be made: {error}", folder.display()))?;
+    let mut files = Files { folder, made: Vec::new() };
+    let several = trail.robots.len() > 1;
+    for (name, seen) in &trail.robots {
+        let file = |what: &str| if several { format!("{what}-{name}") } else { what.to_owned() };
+        if !seen.way.is_empty() {
+            files.write(&file("trajectory"), &trajectory(&trail, seen).draw())?;
+        }
+        if !seen.speed.is_empty() || !seen.commanded.is_empty() {
+            files.write(&file("velocity"), &velocity(&trail, seen).draw())?;
+        }
+        if !seen.log_way.is_empty() && !seen.scan_points.is_empty() {
+            files.write(&file("map"), &map(seen).draw())?;
+        }
+    }
+    if let Some(periods) = periods(&trail) {
+        files.write("periods", &periods.draw())?;
+    }
+    if let Some(timing) = timing.filter(|timing| !timing.agents.is_empty()) {
+        files.write("timing", &timing.draw())?;
+    }
+    Ok(files.made)
+}
+
+struct Files<'a> {
+    folder: &'a Path,
+    made: Vec<PathBuf>,
+}
+
+impl Files<'_> {
+    /// Writes a picture in both forms.
+    fn write(&mut self, name: &str, picture: &Picture) -> Result<(), String> {
+        let png = picture.png(DOTS).map_err(|error| error.to_string())?;
+        for (ending, bytes) in [("png", png), ("svg", picture.svg().into_bytes())] {
+            let path = self.folder.join(format!("{name}.{ending}"));
+            std::fs::write(&path, bytes).map_err(|error| format!("{} cannot be written: {error}", path.display()))?;
+            self.made.push(path);
+        }
+        Ok(())
+    }
+}
+
+fn trajectory(trail: &Trail, seen: &Seen) -> Trajectory {
+    let path: Vec<Waypoint> = seen.way.iter().map(|(time, pose)| Waypoint { time: *time, pose: *pose }).collect();
+    let length = path.last().map_or(0.0, |last| last.time) - path.first().map_or(0.0, |first| first.time);
+    let others = trail.people.iter().map(|(name, points)| (name.clone(), points.clone()));
+    Trajectory {
+        drawing: trail.drawing.clone(),
+        path,
+        bands: trail.bands(),
+        points: seen.points.clone(),
+        points_name: seen.points_name.to_owned(),
+        radius: trail.radius(&seen.name),
+        outline_every: (length / 20.0).max(1.0),
+        goal: None,
+        events: trail.events.clone(),
+        others: others.collect(),
+    }
+}
+
+fn velocity(trail: &Trail, seen: &Seen) -> Velocity {
+    let pick = |name: &str, rows: &[(f64, f64, f64)], which: usize| Series {
+        name: name.to_owned(),
+        points: rows.iter().map(|row| (row.0, if which == 1 { row.1 } else { row.2 })).collect(),
+    };
+    let both = |which| {
+        let rows = [("measured", &seen.speed), ("commanded", &seen.commanded)];
+        rows.into_iter().filter(|(_, rows)| !rows.is_empty()).map(|(name, rows)| pick(name, rows, which)).collect()
+    };
+    let heading = seen.way.iter().chain(if seen.way.is_empty() { &seen.log_way[..] } else { &[] });
+    let heading = Series { name: "measured".into(), points: heading.map(|(time, pose)| (*time, pose.heading)).collect() };
+    Velocity {
+        speed: both(1),
+        angular_speed: both(2),
+        heading: vec![heading],
+        bands: trail.bands(),
+        events: trail.events.clone(),
+    }
+}
+
+/// The way of a recording as the log has it, and where the laser saw something from there.
+fn map(seen: &Seen) -> Map {
+    let points = |way: &[(f64, types::Pose)]| way.iter().map(|(_, pose)| pose.position()).collect::<Vec<Point>>();
+    let mut paths = vec![("the log's own poses".to_owned(), points(&seen.log_way))];
+    if !seen.odometry.is_empty() {
+        paths.push(("odometry".to_owned(), points(&seen.odometry)));
+    }
+    Map { points: seen.scan_points.clone(), points_name: "laser".into(), paths, ..Map::default() }
+}
+
+/// When each agent sent something, in the middle of the run.
+fn periods(trail: &Trail) -> Option<Periods> {
+    let (from, to) = trail.span?;
+    let middle = from + (to - from) / 2.0;
+    let window = (middle, (middle + WINDOW).min(to));
+    let mut rows: BTreeMap<&str, record::figure::PeriodRow> = BTreeMap::new();
+    for (name, times) in &trail.sent {
+        let row = rows.entry(name).or_default();
+        row.name = name.clone();
+        row.releases = times.iter().copied().filter(|time| (window.0..=window.1).contains(time)).collect();
+    }
+    let rows: Vec<_> = rows.into_values().filter(|row| !row.releases.is_empty()).collect();
+    (!rows.is_empty()).then_some(Periods { rows, window: Some(window) })
+}
+
+/// Single steps of each agent, with the counts of all.
+pub(crate) fn timing(agents: &[AgentView], samples: &Samples) -> Timing {
+    let seconds = |nanos: &[f64]| nanos.iter().map(|nanos| nanos * 1e-9).collect();
+    let row = |agent: &AgentView| {
+        let steps = samples.0.get(&agent.name)?;
+        (!steps.exec.is_empty()).then(|| AgentTiming {
+            name: agent.name.clone(),
+            execution: seconds(&steps.exec),
+            jitter: seconds(&steps.jitter),
+            deadline: Some(agent.deadline.seconds()),
+            misses: agent.counts.missed,
+        })
+    };
+    Timing { agents: agents.iter().filter_map(row).collect() }
+}
+
+/// The notes of a log that figures are made from, and nothing that differs between two runs of the same seed.
+pub(crate) type Notes = BTreeMap<String, String>;
+

@@ -1,0 +1,89 @@
+//! What stands in the world, written into a log and read from it again, so that a log alone can be drawn.
+
+use record::figure::{Drawing, Region};
+use serde_json::{Value as Json, json};
+use sim::snapshot::Scenery;
+use types::Point;
+
+use super::Notes;
+use crate::run::Ready;
+
+/// The name of the note with the scenery.
+const SCENERY: &str = "scenery";
+/// The name of the note with the robots.
+const ROBOTS: &str = "robots";
+
+/// What a log has to know of the world and the robots. It depends on the plan and the seed alone.
+pub(crate) fn notes(ready: &Ready) -> Notes {
+    let mut notes = Notes::new();
+    if let Some(truth) = &ready.truth {
+        notes.insert(SCENERY.into(), scenery(truth.scenery()).to_string());
+    }
+    let robots = ready.robots.iter().map(|robot| {
+        json!({
+            "name": robot.name,
+            "radius": robot.radius,
+            "recorded": robot.description.clock == hardware::ClockKind::Recorded,
+        })
+    });
+    notes.insert(ROBOTS.into(), Json::Array(robots.collect()).to_string());
+    notes
+}
+
+fn point(point: Point) -> Json {
+    // Millimetres are finer than any figure, and keep the note short.
+    json!([(point.x * 1e3).round() / 1e3, (point.y * 1e3).round() / 1e3])
+}
+
+fn scenery(scenery: &Scenery) -> Json {
+    let lines = scenery.lines.iter().map(|line| json!([point(line.from), point(line.to)]));
+    let discs = scenery.discs.iter().map(|disc| json!([point(disc.centre), disc.radius]));
+    let regions = scenery.regions.iter().map(|region| {
+        json!({"name": region.name, "polygon": region.polygon.iter().map(|p| point(*p)).collect::<Vec<_>>()})
+    });
+    json!({
+        "lines": lines.collect::<Vec<_>>(),
+        "discs": discs.collect::<Vec<_>>(),
+        "regions": regions.collect::<Vec<_>>(),
+    })
+}
+
+fn read_point(json: &Json) -> Option<Point> {
+    Some(Point::new(json.get(0)?.as_f64()?, json.get(1)?.as_f64()?))
+}
+
+/// The scenery of a log; nothing stands where the log knows nothing.
+pub(super) fn drawing(notes: &Notes) -> Drawing {
+    let Some(json) = notes.get(SCENERY).and_then(|text| serde_json::from_str::<Json>(text).ok()) else {
+        return Drawing::default();
+    };
+    let rows = |key: &str| json[key].as_array().cloned().unwrap_or_default();
+    let line = |row: &Json| Some((read_point(&row[0])?, read_point(&row[1])?));
+    let disc = |row: &Json| Some((read_point(&row[0])?, row[1].as_f64()?));
+    let region = |row: &Json| {
+        let corners = row["polygon"].as_array()?.iter().filter_map(read_point).collect();
+        Some(Region { corners, name: row["name"].as_str()?.to_owned() })
+    };
+    Drawing {
+        segments: rows("lines").iter().filter_map(line).collect(),
+        circles: rows("discs").iter().filter_map(disc).collect(),
+        regions: rows("regions").iter().filter_map(region).collect(),
+        ..Drawing::default()
+    }
+}
+
+/// A robot of a log.
+#[derive(Clone, Debug)]
+pub(super) struct KnownRobot {
+    pub(super) name: String,
+    pub(super) radius: f64,
+}
+
+/// The robots of a log.
+pub(super) fn robots(notes: &Notes) -> Vec<KnownRobot> {
+    let rows = notes.get(ROBOTS).and_then(|text| serde_json::from_str::<Vec<Json>>(text).ok()).unwrap_or_default();
+    let robot = |row: &Json| {
+        Some(KnownRobot { name: row["name"].as_str()?.to_owned(), radius: row["radius"].as_f64()? })
+    };
+    rows.iter().filter_map(robot).collect()
+}

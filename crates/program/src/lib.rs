@@ -1,0 +1,23 @@
+//! The command line and the system file, as a library.
+//!
+//! | to find | look in |
+//! |---|---|
+//! | from a system file to a plan and back | [`file`] |
+//! | its schema for editors | [`schema`] |
+//! | templates of agents and systems | [`new`] |
+//! | what a machine can do for real time | [`doctor`] |
+//! | how mistakes look, for people and programs | [`Failure`] |
+
+mod cli;
+pub mod doctor;
+mod error;
+mod figures;
+pub mod file;
+pub mod new;
+mod run;
+pub mod schema;
+mod terminal;
+mod tools;
+
+pub use cli::program;
+pub use error::{Failure, Paint, Place, Problem};

@@ -1,0 +1,267 @@
+//! The commands that ask or change a system that runs in another process.
+
+mod shown;
+
+use std::process::ExitCode;
+use std::time::Duration as HostDuration;
+
+use clap::{Args, Subcommand};
+use control::{Client, ClientError, Event};
+use runtime::Plan;
+use serde_json::{Value as Json, json};
+
+use crate::error::Failure;
+use crate::{file, run, terminal};
+
+/// Which system is meant.
+#[derive(Args, Clone, Debug)]
+pub(crate) struct Which {
+    /// The system, where several run.
+    #[arg(long, value_name = "NAME")]
+    system: Option<String>,
+}
+
+/// What can be asked of a running system.
+#[derive(Debug, Subcommand)]
+pub(crate) enum LiveCommand {
+    /// Lists the agents that run, and how they are.
+    Ls(Which),
+    /// Shows agents, ports and wires.
+    Graph {
+        /// For Graphviz: sinew graph --dot | dot -Tsvg
+        #[arg(long, conflicts_with = "toml")]
+        dot: bool,
+        /// As a system file.
+        #[arg(long)]
+        toml: bool,
+        #[command(flatten)]
+        which: Which,
+    },
+    /// Shows timing and counts, again and again on a terminal.
+    Top(Which),
+    /// Shows the last decisions with their reasons.
+    Why {
+        /// How many.
+        #[arg(value_name = "N", default_value_t = 10)]
+        count: usize,
+        #[command(flatten)]
+        which: Which,
+    },
+    /// Adds an agent: sinew add NAME is KIND [robot=h1] [period=50ms] [on=ranges] [KEY=VALUE…]
+    Add(Words),
+    /// Removes an agent and its wires.
+    Remove(Words),
+    /// Starts an agent anew.
+    Restart(Words),
+    /// Puts another agent in the place of one: sinew replace NAME is KIND [KEY=VALUE…]
+    Replace(Words),
+    /// Makes a wire: sinew wire FROM.PORT TO.PORT [depth=N] [overload=…] [every=N]
+    Wire(Words),
+    /// Cuts a wire, when what is on it has arrived.
+    Unwire(Words),
+    /// Sets parameters, or period, deadline, min_gap: sinew set NAME KEY=VALUE…
+    Set(Words),
+    /// The emergency stop: all robots stand until "sinew reset".
+    Stop(Words),
+    /// Ends the emergency stop; nothing moves by it.
+    Reset(Which),
+    /// Ends the run.
+    Quit(Which),
+    /// Shows the messages of an output as they come.
+    Tap {
+        /// The output, as in sonar.filtered.
+        #[arg(value_name = "AGENT.PORT")]
+        port: String,
+        /// Only every n-th message.
+        #[arg(long, value_name = "N", default_value_t = 1)]
+        every: u64,
+        /// Ends after so many messages.
+        #[arg(long, value_name = "N")]
+        count: Option<u64>,
+        #[command(flatten)]
+        which: Which,
+    },
+    /// Calls a service and shows the answer: sinew call AGENT.SERVICE [FIELD=VALUE…]
+    Call(Words),
+    /// Sends a message out of a port: sinew send AGENT.PORT linear.x=0.2
+    Send(Words),
+    /// Makes an agent or a sensor misbehave: off, stuck, garbage, wrong, slow, intermittent, panic, hang; ok ends it.
+    Fault(Words),
+}
+
+/// What is said to a system in words.
+#[derive(Args, Clone, Debug)]
+pub(crate) struct Words {
+    /// Names and KEY=VALUE.
+    #[arg(value_name = "WORDS", allow_hyphen_values = false)]
+    words: Vec<String>,
+    #[command(flatten)]
+    which: Which,
+}
+
+impl LiveCommand {
+    /// The words of a command that is only that, and which system it is for.
+    fn plain(&self) -> Option<(&'static str, &[String], &Which)> {
+        Some(match self {
+            LiveCommand::Add(said) => ("add", &said.words, &said.which),
+            LiveCommand::Remove(said) => ("remove", &said.words, &said.which),
+            LiveCommand::Restart(said) => ("restart", &said.words, &said.which),
+            LiveCommand::Replace(said) => ("replace", &said.words, &said.which),
+            LiveCommand::Wire(said) => ("wire", &said.words, &said.which),
+            LiveCommand::Unwire(said) => ("unwire", &said.words, &said.which),
+            LiveCommand::Set(said) => ("set", &said.words, &said.which),
+            LiveCommand::Stop(said) => ("stop", &said.words, &said.which),
+            LiveCommand::Fault(said) => ("fault", &said.words, &said.which),
+            LiveCommand::Send(said) => ("send", &said.words, &said.which),
+            LiveCommand::Call(said) => ("call", &said.words, &said.which),
+            LiveCommand::Reset(which) => ("reset", &[], which),
+            LiveCommand::Quit(which) => ("quit", &[], which),
+            _ => return None,
+        })
+    }
+}
+
+/// Does a command.
+pub(crate) fn live(command: LiveCommand, json: bool) -> Result<ExitCode, Failure> {
+    if let Some((verb, words, which)) = command.plain() {
+        return said(verb, words, which, json);
+    }
+    match command {
+        LiveCommand::Ls(which) => show(&which, "ls", shown::ls, json),
+        LiveCommand::Graph { dot, toml, which } => graph(&which, dot, toml, json),
+        LiveCommand::Top(which) => top(&which, json),
+        LiveCommand::Why { count, which } => {
+            let answer = ask(&mut connect(&which)?, &["why".to_owned(), count.to_string()])?;
+            show_answer(&answer, shown::why, json);
+            Ok(ExitCode::SUCCESS)
+        }
+        LiveCommand::Tap { port, every, count, which } => tap(&which, &port, every, count, json),
+        _ => Ok(ExitCode::SUCCESS),
+    }
+}
+
+fn connect(which: &Which) -> Result<Client, Failure> {
+    Client::connect(which.system.as_deref()).map_err(failure)
+}
+
+fn ask(client: &mut Client, words: &[String]) -> Result<Json, Failure> {
+    client.call(words).map_err(failure)
+}
+
+/// A system that refuses, or is not there, is no wrong usage; a word that it does not know is.
+fn failure(error: ClientError) -> Failure {
+    match error {
+        ClientError::Refused(refusal) => refusal.into(),
+        other => Failure::new(other.to_string()),
+    }
+}
+
+fn said(verb: &str, words: &[String], which: &Which, json: bool) -> Result<ExitCode, Failure> {
+    let all: Vec<String> = std::iter::once(verb.to_owned()).chain(words.iter().cloned()).collect();
+    if control::words::CHANGES.iter().any(|usage| usage.verb == verb) && verb != "send" {
+        // What is wrong in the words alone is told without a system.
+        control::words::parse(&all)?;
+    }
+    let mut client = connect(which)?;
+    let answer = ask(&mut client, &all)?;
+    if json {
+        terminal::say_json(&json!({"system": client.system(), "answer": answer}));
+    } else if verb == "call" {
+        terminal::say(&shown::message(&answer));
+    } else {
+        terminal::say(&format!("{}: done: {}", client.system(), control::words::join(&all)));
+    }
+    Ok(ExitCode::SUCCESS)
+}
+
+fn show(which: &Which, verb: &str, text: fn(&Json) -> String, json: bool) -> Result<ExitCode, Failure> {
+    let answer = ask(&mut connect(which)?, &[verb.to_owned()])?;
+    show_answer(&answer, text, json);
+    Ok(ExitCode::SUCCESS)
+}
+
+fn show_answer(answer: &Json, text: fn(&Json) -> String, json: bool) {
+    if json { terminal::say_json(answer) } else { terminal::say(&text(answer)) }
+}
+
+fn graph(which: &Which, dot: bool, toml: bool, json: bool) -> Result<ExitCode, Failure> {
+    let mut client = connect(which)?;
+    if toml {
+        let plan = ask(&mut client, &["plan".to_owned()])?;
+        let text = plan_text(&plan)?;
+        if json { terminal::say_json(&json!({"toml": text})) } else { terminal::say(&text) }
+        return Ok(ExitCode::SUCCESS);
+    }
+    let answer = ask(&mut client, &["graph".to_owned()])?;
+    match dot {
+        true if json => terminal::say_json(&json!({"dot": shown::dot(&answer)})),
+        true => terminal::say(&shown::dot(&answer)),
+        false => show_answer(&answer, shown::graph, json),
+    }
+    Ok(ExitCode::SUCCESS)
+}
+
+/// The running plan as a system file. What the runtime does not know of it (world, robots, goal) comes from the file that was
+/// run; see the run's own command `file`.
+fn plan_text(answer: &Json) -> Result<String, Failure> {
+    let (agents, wires) = control::shapes::read_plan(answer)?;
+    let name = answer["system"].as_str().unwrap_or_default();
+    let plan = Plan { agents, wires, ..Plan::new(name) };
+    Ok(file::write_plan(&run::plan_of_file(plan)))
+}
+
+/// How often `top` looks.
+const LOOK: HostDuration = HostDuration::from_millis(500);
+
+fn top(which: &Which, json: bool) -> Result<ExitCode, Failure> {
+    let mut client = connect(which)?;
+    let words = ["top".to_owned()];
+    let answer = ask(&mut client, &words)?;
+    if json || !terminal::watched() {
+        show_answer(&answer, shown::top, json);
+        return Ok(ExitCode::SUCCESS);
+    }
+    let mut answer = answer;
+    loop {
+        // From the upper left corner over what stood there, so that nothing flickers.
+        terminal::say(&format!("\u{1b}[H{}\u{1b}[J", shown::top(&answer).replace('\n', "\u{1b}[K\n")));
+        terminal::pause(LOOK);
+        answer = match client.call(&words) {
+            Ok(answer) => answer,
+            Err(ClientError::Ended) => return Ok(ExitCode::SUCCESS),
+            Err(error) => return Err(failure(error)),
+        };
+    }
+}
+
+fn tap(which: &Which, port: &str, every: u64, count: Option<u64>, json: bool) -> Result<ExitCode, Failure> {
+    let mut client = connect(which)?;
+    ask(&mut client, &["tap".to_owned(), port.to_owned(), format!("every={every}")])?;
+    let mut left = count.unwrap_or(u64::MAX);
+    let mut documents = Vec::new();
+    while left > 0 {
+        let event = match client.next_event(None) {
+            Ok(Some(event)) => event,
+            Ok(None) => continue,
+            Err(ClientError::Ended) => break,
+            Err(error) => return Err(failure(error)),
+        };
+        match event {
+            Event::Message { header, message, .. } if json => {
+                left -= 1;
+                let document = json!({"header": header, "message": message});
+                // A document with an end can be one; without one each message is a line of its own.
+                if count.is_some() { documents.push(document) } else { terminal::say_json(&document) }
+            }
+            Event::Message { header, message, .. } => {
+                left -= 1;
+                terminal::say(&shown::heard(&header, &message));
+            }
+            Event::Lost { count, .. } => terminal::tell(&format!("{count} messages were lost: this reader was too slow")),
+        }
+    }
+    if json && count.is_some() {
+        terminal::say_json(&Json::Array(documents));
+    }
+    Ok(ExitCode::SUCCESS)
+}

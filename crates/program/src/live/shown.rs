@@ -1,0 +1,183 @@
+//! Answers of a running system as people read them.
+
+use std::fmt::Write as _;
+
+use serde_json::Value as Json;
+
+use crate::run::{span, table};
+
+fn rows<'a>(json: &'a Json, key: &str) -> impl Iterator<Item = &'a Json> + use<'a> {
+    json[key].as_array().map(Vec::as_slice).unwrap_or_default().iter()
+}
+
+fn text(json: &Json) -> String {
+    match json {
+        Json::String(text) => text.clone(),
+        Json::Null => "-".to_owned(),
+        other => other.to_string(),
+    }
+}
+
+fn milliseconds(json: &Json) -> String {
+    json.as_f64().map_or("-".to_owned(), |seconds| span(seconds * 1e9))
+}
+
+/// The agents.
+pub(super) fn ls(answer: &Json) -> String {
+    let head = ["agent", "kind", "state", "executor", "asked", "granted", "period", "steps", "restarts"];
+    let mut lines = vec![head.map(str::to_owned)];
+    lines.extend(rows(answer, "agents").map(|agent| {
+        [
+            text(&agent["name"]),
+            text(&agent["kind"]),
+            text(&agent["state"]),
+            text(&agent["executor"]),
+            text(&agent["asked"]),
+            text(&agent["granted"]),
+            milliseconds(&agent["period_s"]),
+            text(&agent["releases"]),
+            text(&agent["restarts"]),
+        ]
+    }));
+    let mut out = format!("{} at {:.2} s\n{}", text(&answer["system"]), answer["time_s"].as_f64().unwrap_or(0.0), table(&lines, 6));
+    for agent in rows(answer, "agents").filter(|agent| !agent["last_death"].is_null()) {
+        let _ = writeln!(out, "  {} died last: {}", text(&agent["name"]), text(&agent["last_death"]));
+    }
+    out
+}
+
+/// Agents with what leads out of them.
+pub(super) fn graph(answer: &Json) -> String {
+    let mut out = format!("{}\n", text(&answer["system"]));
+    for agent in rows(answer, "agents") {
+        let name = text(&agent["name"]);
+        let _ = writeln!(out, "{name} ({}, {})", text(&agent["kind"]), text(&agent["executor"]));
+        let own = |wire: &&Json| wire["from"].as_str().is_some_and(|from| runtime::owner(from) == name);
+        for wire in rows(answer, "wires").filter(own) {
+            let mut line = format!("  {} → {}  {}, {} sent", text(&wire["from"]), text(&wire["to"]), text(&wire["message"]), text(&wire["sent"]));
+            for (key, word) in [("dropped", "dropped"), ("refused", "given back"), ("expired", "read too late")] {
+                if wire[key].as_u64().is_some_and(|count| count > 0) {
+                    let _ = write!(line, ", {} {word}", wire[key]);
+                }
+            }
+            let _ = writeln!(out, "{line}");
+        }
+    }
+    out
+}
+
+/// The graph for Graphviz.
+pub(super) fn dot(answer: &Json) -> String {
+    let quoted = |json: &Json| format!("\"{}\"", text(json).replace('"', "\\\""));
+    let mut out = format!("digraph {} {{\n  rankdir = LR;\n  node [shape = box];\n", quoted(&answer["system"]));
+    for agent in rows(answer, "agents") {
+        let _ = writeln!(out, "  {} [label = {}];", quoted(&agent["name"]), quoted(&format!("{}\n{}", text(&agent["name"]), text(&agent["kind"])).into()));
+    }
+    for wire in rows(answer, "wires") {
+        let (from, to) = (text(&wire["from"]), text(&wire["to"]));
+        let label = |port: &str| port.rsplit_once('.').map_or(port.to_owned(), |(_, port)| port.to_owned());
+        let ends = [runtime::owner(&from), runtime::owner(&to)].map(|agent| quoted(&agent.into()));
+        let _ = writeln!(
+            out,
+            "  {} -> {} [taillabel = {}, headlabel = {}];",
+            ends[0],
+            ends[1],
+            quoted(&label(&from).into()),
+            quoted(&label(&to).into())
+        );
+    }
+    out + "}\n"
+}
+
+/// Timing of the agents.
+pub(super) fn top(answer: &Json) -> String {
+    let head = ["agent", "state", "granted", "steps", "missed", "skipped", "restarts", "exec p50", "p99", "max", "jitter p99", "max"];
+    let mut lines = vec![head.map(str::to_owned)];
+    let figure = |agent: &Json, of: &str, key: &str| agent[of][key].as_f64().map_or("-".to_owned(), span);
+    lines.extend(rows(answer, "agents").map(|agent| {
+        [
+            text(&agent["name"]),
+            text(&agent["state"]),
+            text(&agent["granted"]),
+            text(&agent["releases"]),
+            text(&agent["missed"]),
+            text(&agent["skipped"]),
+            text(&agent["restarts"]),
+            figure(agent, "exec", "p50"),
+            figure(agent, "exec", "p99"),
+            figure(agent, "exec", "max"),
+            figure(agent, "jitter", "p99"),
+            figure(agent, "jitter", "max"),
+        ]
+    }));
+    let messages = &answer["messages"];
+    format!(
+        "{} at {:.2} s: {} messages sent, {} dropped, {} given back\n{}",
+        text(&answer["system"]),
+        answer["time_s"].as_f64().unwrap_or(0.0),
+        text(&messages["sent"]),
+        text(&messages["dropped"]),
+        text(&messages["refused"]),
+        table(&lines, 3)
+    )
+}
+
+/// The last changes of the decision.
+pub(super) fn why(answer: &Json) -> String {
+    let decisions = answer.as_array().map(Vec::as_slice).unwrap_or_default();
+    if decisions.is_empty() {
+        return "nothing was decided yet".to_owned();
+    }
+    let mut out = String::new();
+    for decision in decisions {
+        let number = |key: &str| decision[key].as_f64().unwrap_or(0.0);
+        let weights = decision["weights"].as_object().into_iter().flatten();
+        let weights: Vec<String> = weights.map(|(agent, weight)| format!("{agent} {weight}")).collect();
+        let _ = writeln!(
+            out,
+            "{:9.2} s  {} → {}: {} has the say ({}), because danger is {:.2} and desire {:.2}",
+            number("time_s"),
+            text(&decision["before"]),
+            text(&decision["situation"]),
+            text(&decision["active"]),
+            weights.join(", "),
+            number("danger"),
+            number("desire"),
+        );
+    }
+    out
+}
+
+/// A message with when it was sent and by whom.
+pub(super) fn heard(header: &Json, message: &Json) -> String {
+    let stamp = header["stamp_ns"].as_f64().unwrap_or(0.0) * 1e-9;
+    let mut out = format!("{stamp:.6} s  #{} from {}", text(&header["sequence"]), text(&header["sender"]));
+    for (key, usual) in [("category", "data"), ("priority", "normal")] {
+        if header[key] != usual {
+            let _ = write!(out, ", {} {key}", text(&header[key]));
+        }
+    }
+    format!("{out}\n{}", self::message(message))
+}
+
+/// A message as one line a field.
+pub(super) fn message(message: &Json) -> String {
+    let mut out = String::new();
+    fields(message, "  ", &mut out);
+    out
+}
+
+fn fields(json: &Json, indent: &str, out: &mut String) {
+    let Json::Object(rows) = json else {
+        let _ = writeln!(out, "{indent}{}", text(json));
+        return;
+    };
+    for (key, value) in rows {
+        if value.is_object() {
+            let _ = writeln!(out, "{indent}{key}:");
+            fields(value, &format!("{indent}  "), out);
+        } else {
+            let _ = writeln!(out, "{indent}{key}: {}", text(value));
+        }
+    }
+}

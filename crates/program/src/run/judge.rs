@@ -1,0 +1,122 @@
+//! The judge: looks at the truth from outside, keeps what the figures need of it, and says when a run is over.
+
+use std::collections::VecDeque;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Arc, Mutex, PoisonError};
+
+use hardware::gate::Counts;
+use hardware::simulated::Truth;
+use runtime::{Incident, Observer, Verdict};
+use types::messages::{Odometry, Twist};
+use types::{Duration, Name, Pose, Time};
+
+use super::prepare::Ready;
+
+/// How often the judge looks. Goals and collisions are watched by the world itself in every step of physics, so this only
+/// says how late a run ends.
+const LOOK: Duration = Duration::millis(20);
+/// Every so many looks the truth is kept: ten times a second, which at walking speed is every few centimetres.
+const KEEP_EVERY: u64 = 5;
+/// The frame of the simulated world in the log.
+pub(crate) const WORLD: &str = "world";
+
+/// Where something truly was.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Fact {
+    /// When, on the clock of the run.
+    pub(crate) time: Time,
+    /// Whose, and where.
+    pub(crate) odometry: Odometry,
+}
+
+/// The truth on its way from the judge to the log.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Facts(Arc<Mutex<VecDeque<Fact>>>);
+
+impl Facts {
+    fn put(&self, fact: Fact) {
+        self.0.lock().unwrap_or_else(PoisonError::into_inner).push_back(fact);
+    }
+
+    /// The oldest fact, if it was true before `time`.
+    pub(crate) fn before(&self, time: Time) -> Option<Fact> {
+        let mut facts = self.0.lock().unwrap_or_else(PoisonError::into_inner);
+        if facts.front().is_some_and(|fact| fact.time < time) { facts.pop_front() } else { None }
+    }
+}
+
+/// Looks at a run and may end it.
+pub(crate) struct Judge {
+    truth: Option<Truth>,
+    recordings: Vec<Arc<Counts>>,
+    /// Set by a signal.
+    asked_to_end: Arc<AtomicBool>,
+    /// Where the truth goes; nobody wants it when nothing is logged.
+    facts: Option<Facts>,
+    people: Vec<String>,
+    looks: u64,
+}
+
+/// Why runs end, in the words of the summary.
+pub(crate) const DECIDED: &str = "the goal is decided";
+/// See [`DECIDED`].
+pub(crate) const INTERRUPTED: &str = "interrupted";
+/// See [`DECIDED`].
+pub(crate) const PLAYED: &str = "the recording is over";
+
+impl Judge {
+    pub(crate) fn new(ready: &Ready, asked_to_end: Arc<AtomicBool>, facts: Option<Facts>) -> Judge {
+        let recorded = ready.robots.iter().filter(|robot| robot.description.clock == hardware::ClockKind::Recorded);
+        let people = ready.truth.iter().flat_map(|truth| truth.plan().people.iter());
+        Judge {
+            people: people.map(|person| person.name.clone()).collect(),
+            truth: ready.truth.clone(),
+            recordings: recorded.map(|robot| robot.counts.clone()).collect(),
+            asked_to_end,
+            facts,
+            looks: 0,
+        }
+    }
+
+    fn keep(&self, time: Time) {
+        let (Some(truth), Some(facts)) = (&self.truth, &self.facts) else { return };
+        for (name, robot) in truth.robots() {
+            let twist = Twist::new(robot.truth.linear, robot.truth.angular);
+            facts.put(fact(time, &name, robot.truth.pose, twist));
+        }
+        for name in &self.people {
+            if let Some(person) = truth.person(name).filter(|person| person.present) {
+                let pose = Pose::new(person.at.x, person.at.y, person.facing);
+                facts.put(fact(time, name, pose, Twist::ZERO));
+            }
+        }
+    }
+}
+
+fn fact(time: Time, name: &str, pose: Pose, twist: Twist) -> Fact {
+    Fact { time, odometry: Odometry { frame: Name::new(WORLD), body: Name::new(name), pose, twist } }
+}
+
+impl Observer for Judge {
+    fn every(&self) -> Duration {
+        LOOK
+    }
+
+    fn observe(&mut self, now: Time, _: &[Incident]) -> Verdict {
+        if self.looks.is_multiple_of(KEEP_EVERY) {
+            self.keep(now);
+        }
+        self.looks += 1;
+        let ended = |why: &str| Verdict::End(why.to_owned());
+        if self.asked_to_end.load(Ordering::Relaxed) {
+            return ended(INTERRUPTED);
+        }
+        if self.truth.as_ref().is_some_and(Truth::decided) {
+            return ended(DECIDED);
+        }
+        if !self.recordings.is_empty() && self.recordings.iter().all(|counts| counts.ended()) {
+            return ended(PLAYED);
+        }
+        Verdict::GoOn
+    }
+}

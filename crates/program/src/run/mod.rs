@@ -1,0 +1,262 @@
+//! `sinew run`: from a name to a summary, a log and figures.
+//!
+//! ```text
+//!   file ──load──▶ Scenario ──prepare(seed)──▶ Ready ──▶ Simulation or Live ──▶ Report ──▶ Summary
+//!                                                ▲              │  │
+//!                                     Judge ─────┘         log ◀┘  └▶ screen, control
+//! ```
+
+mod judge;
+mod options;
+mod prepare;
+mod recorder;
+mod sampler;
+mod screen;
+mod seeds;
+mod serve;
+mod summary;
+
+use std::path::{Path, PathBuf};
+use std::process::ExitCode;
+use std::sync::atomic::AtomicBool;
+use std::sync::{Arc, PoisonError};
+
+use hardware::Berth;
+use record::log::RunInfo;
+use runtime::{CannotRun, Control, Live, Options, Plan, Recorder, Registry, Report, Simulation};
+use types::Duration;
+
+use crate::cli::{ClockChoice, RunArgs, Speed};
+use crate::error::Failure;
+use crate::{figures, file, terminal};
+
+pub(crate) use judge::WORLD;
+pub(crate) use prepare::{ROBOT_KIND, Ready, Scenario};
+pub(crate) use sampler::Samples;
+pub(crate) use summary::{Summary, agent_table, figure_json, span, table};
+
+/// How long a simulated system without a goal runs when nobody says: long enough to see what it does.
+const WITHOUT_GOAL: Duration = Duration::secs(60);
+/// How fast a run goes that people look at.
+const WATCHED_SPEED: f64 = 10.0;
+
+/// Runs what the command line says.
+pub(crate) fn run(args: &RunArgs, registry: Registry, json: bool) -> Result<ExitCode, Failure> {
+    if args.web.is_some() {
+        terminal::tell("the web page is not there yet; the run goes on without it");
+    }
+    let scenario = options::scenario(args, with_robots(registry))?;
+    let asked_to_end = on_signals()?;
+    if let Some(range) = args.seeds {
+        return seeds::run(args, &scenario, range, &asked_to_end, json);
+    }
+    let ready = scenario.prepare(args.seed)?;
+    let clock = options::clock(args, &ready)?;
+    let watched = !json && terminal::watched();
+    let place = Place::of(args, &scenario.file.plan.name, args.seed)?;
+    let whole = One { args, scenario: &scenario, seed: args.seed, clock, watched, place, asked_to_end, serves: true };
+    let summary = whole.run(ready)?;
+    if json {
+        terminal::say_json(&summary.to_json());
+    } else {
+        terminal::say(&summary.to_text(terminal::coloured()));
+    }
+    Ok(if summary.is_success() { ExitCode::SUCCESS } else { ExitCode::FAILURE })
+}
+
+/// A registry that knows robots too, for reading files. Each run puts gates in the place of this type.
+pub(crate) fn with_robots(mut registry: Registry) -> Registry {
+    registry.extend([Berth::default().agent_type("robot")]);
+    registry
+}
+
+/// A flag that the usual signals set. A second one ends the process at once.
+fn on_signals() -> Result<Arc<AtomicBool>, Failure> {
+    let asked = Arc::new(AtomicBool::new(false));
+    for signal in [signal_hook::consts::SIGINT, signal_hook::consts::SIGTERM] {
+        // In this order: the first signal finds the flag clear and sets it, the second finds it set.
+        signal_hook::flag::register_conditional_shutdown(signal, 130, asked.clone())
+            .and_then(|_| signal_hook::flag::register(signal, asked.clone()))
+            .map_err(|error| Failure::new(format!("signals cannot be handled: {error}")).code(1))?;
+    }
+    Ok(asked)
+}
+
+/// Where the files of a run go.
+#[derive(Clone, Debug)]
+pub(crate) struct Place {
+    /// The folder.
+    folder: PathBuf,
+    /// The log; nothing when there shall be none.
+    log: Option<PathBuf>,
+}
+
+impl Place {
+    fn of(args: &RunArgs, name: &str, seed: u64) -> Result<Option<Place>, Failure> {
+        if args.no_log && args.out.is_none() {
+            return Ok(None);
+        }
+        let folder = args.out.clone().unwrap_or_else(|| Path::new("out").join(format!("{name}-seed{seed}")));
+        Place::in_folder(folder, args).map(Some)
+    }
+
+    fn in_folder(folder: PathBuf, args: &RunArgs) -> Result<Place, Failure> {
+        std::fs::create_dir_all(&folder).map_err(|error| {
+            Failure::new(format!("the folder {} cannot be made: {error}", folder.display()))
+                .help("--out names another one, --no-log writes nothing")
+        })?;
+        let log = (!args.no_log).then(|| args.log.clone().unwrap_or_else(|| folder.join("run.mcap")));
+        Ok(Place { folder, log })
+    }
+}
+
+/// One run of a scenario.
+struct One<'a> {
+    args: &'a RunArgs,
+    scenario: &'a Scenario,
+    seed: u64,
+    clock: ClockChoice,
+    /// Whether somebody looks at it on a terminal.
+    watched: bool,
+    place: Option<Place>,
+    asked_to_end: Arc<AtomicBool>,
+    /// Whether others can ask it while it runs.
+    serves: bool,
+}
+
+impl One<'_> {
+    fn run(&self, ready: Ready) -> Result<Summary, Failure> {
+        let log = self.log(&ready)?;
+        let facts = log.as_ref().map(|(_, facts, _)| facts.clone());
+        let judge = judge::Judge::new(&ready, self.asked_to_end.clone(), facts);
+        let (recorder, outcome) = match log {
+            Some((file, _, outcome)) => (Some(Box::new(file) as Box<dyn Recorder>), Some(outcome)),
+            None => (None, None),
+        };
+        let options = Options {
+            limit: self.limit(&ready),
+            speed: self.speed(),
+            log: if recorder.is_some() { recorder::choice(&ready, self.args.images) } else { Default::default() },
+            recorder,
+            observer: Box::new(judge),
+            parse: control::words::parse,
+        };
+        let (report, samples) = self.play(&ready, options)?;
+        let mut summary = Summary::new(&ready, self.seed, clock_name(self.clock), report);
+        summary.images = self.args.images;
+        summary.log = outcome.map(|outcome| outcome.lock().unwrap_or_else(PoisonError::into_inner).clone());
+        self.write_files(&ready, &mut summary, samples);
+        Ok(summary)
+    }
+
+    fn log(&self, ready: &Ready) -> Result<Option<(recorder::LogFile, judge::Facts, recorder::SharedOutcome)>, Failure> {
+        let Some(path) = self.place.as_ref().and_then(|place| place.log.as_ref()) else { return Ok(None) };
+        let run = RunInfo {
+            system: ready.plan.name.clone(),
+            seed: Some(self.seed),
+            clock: match self.clock {
+                ClockChoice::Sim => record::log::Clock::Simulated,
+                ClockChoice::Wall => record::log::Clock::Wall,
+            },
+            plan: file::write_plan(&plan_of_file(ready.plan.clone())),
+            notes: figures::notes(ready),
+        };
+        let facts = judge::Facts::default();
+        let (file, outcome) = recorder::LogFile::create(path, &run, self.args.images, facts.clone())
+            .map_err(|error| Failure::new(error.to_string()).help("--log names another file, --no-log writes none"))?;
+        Ok(Some((file, facts, outcome)))
+    }
+
+    fn limit(&self, ready: &Ready) -> Option<Duration> {
+        // The judge ends a run whose goal can no longer be met in time; the limit stands behind it.
+        let of_goal = ready.goal.as_ref().map(|goal| goal.within + Duration::secs(1));
+        let recorded = ready.robots.iter().any(|robot| robot.description.clock == hardware::ClockKind::Recorded);
+        let usual = (self.clock == ClockChoice::Sim && !recorded).then_some(WITHOUT_GOAL);
+        self.args.limit.or(of_goal).or(usual)
+    }
+
+    fn speed(&self) -> Option<f64> {
+        match self.args.speed {
+            Some(Speed::Times(times)) => Some(times),
+            Some(Speed::Most) => None,
+            None => self.watched.then_some(WATCHED_SPEED),
+        }
+    }
+
+    /// Runs it, and meanwhile draws it, answers others, and samples how long steps take.
+    fn play(&self, ready: &Ready, options: Options) -> Result<(Report, sampler::Samples), Failure> {
+        let sources = &self.scenario.file.sources;
+        let cannot = |error: CannotRun| summary::failure(error, sources);
+        match self.clock {
+            ClockChoice::Sim => {
+                let simulation = Simulation::new(&ready.plan, &ready.registry, options).map_err(cannot)?;
+                let beside = self.beside(ready, simulation.control())?;
+                let report = simulation.run();
+                Ok((report.map_err(cannot)?, beside.end()))
+            }
+            ClockChoice::Wall => {
+                let live = Live::new(&ready.plan, &ready.registry, options).map_err(cannot)?;
+                let beside = self.beside(ready, live.control())?;
+                let report = live.run();
+                Ok((report.map_err(cannot)?, beside.end()))
+            }
+        }
+    }
+
+    fn beside(&self, ready: &Ready, control: Control) -> Result<Beside, Failure> {
+        Ok(Beside {
+            server: if self.serves { serve::start(ready, &control, &self.asked_to_end) } else { None },
+            screen: if self.watched { Some(screen::Screen::start(ready, control.clone())?) } else { None },
+            sampler: if self.place.is_some() { sampler::Sampler::start(control) } else { None },
+        })
+    }
+
+    fn write_files(&self, ready: &Ready, summary: &mut Summary, samples: sampler::Samples) {
+        let Some(place) = &self.place else { return };
+        let timing = place.folder.join("timing.json");
+        match std::fs::write(&timing, sampler::to_json(summary, &samples).to_string()) {
+            Ok(()) => summary.files.push(timing),
+            Err(error) => terminal::tell(&format!("warning: {} cannot be written: {error}", timing.display())),
+        }
+        let Some(log) = &place.log else { return };
+        if log.is_file() {
+            summary.files.insert(0, log.clone());
+        }
+        let made = figures::of_log(log, &place.folder, Some(figures::timing(&summary.agents, &samples)));
+        match made {
+            Ok(files) => summary.files.extend(files),
+            Err(error) => terminal::tell(&format!("warning: no figures: {error}")),
+        }
+        let _ = ready;
+    }
+}
+
+/// What goes on beside a run. All of it ends with the run.
+struct Beside {
+    server: Option<serve::Serving>,
+    screen: Option<screen::Screen>,
+    sampler: Option<sampler::Sampler>,
+}
+
+impl Beside {
+    fn end(self) -> sampler::Samples {
+        drop(self.server);
+        drop(self.screen);
+        self.sampler.map(sampler::Sampler::end).unwrap_or_default()
+    }
+}
+
+/// The plan as its file has it: the gates' own types are a matter of the run.
+pub(crate) fn plan_of_file(mut plan: Plan) -> Plan {
+    for agent in plan.agents.iter_mut().filter(|agent| agent.kind.starts_with(ROBOT_KIND)) {
+        agent.kind = "robot".to_owned();
+    }
+    plan
+}
+
+fn clock_name(clock: ClockChoice) -> &'static str {
+    match clock {
+        ClockChoice::Sim => "sim",
+        ClockChoice::Wall => "wall",
+    }
+}

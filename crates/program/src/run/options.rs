@@ -1,0 +1,80 @@
+//! From the arguments of `run` to a scenario and a clock.
+
+use std::io;
+use std::path::{Path, PathBuf};
+
+use hardware::{carmen, ticks};
+use runtime::Registry;
+use types::value::Value;
+
+use super::prepare::{Ready, Scenario};
+use crate::cli::{ClockChoice, RunArgs};
+use crate::error::Failure;
+use crate::file;
+
+/// Reads the system file, with the changes that the command line makes to it.
+pub(super) fn scenario(args: &RunArgs, registry: Registry) -> Result<Scenario, Failure> {
+    let mut loaded = file::load(&args.system, &args.set, &registry)?;
+    if let Some(from) = &args.from {
+        let (driver, folder) = recording(from)?;
+        let robots = loaded.plan.section("robot").map(|robots| robots.rows()).unwrap_or_default();
+        let [robot] = robots else {
+            return Err(Failure::new(format!("--from gives one robot its recording, and the plan has {}", robots.len()))
+                .help("say it in the plan, as in driver = \"carmen:FILE\""));
+        };
+        let path = format!("robot.{}.driver", types::value::Key(&robot.key));
+        let set = loaded.plan.sections.set_path(&path, Value::Text(driver));
+        set.map_err(|mistake| Failure::new(mistake.what))?;
+        loaded.folder = folder;
+    } else if args.system == RECORDED {
+        return Err(Failure::new("the scenario \"recorded\" needs the file of a recorded robot")
+            .help("name it, as in: sinew run recorded --from fr079.log"));
+    }
+    if !args.only.is_empty() {
+        let names: Vec<String> = args.only.iter().map(|name| name.trim().to_owned()).collect();
+        loaded.plan.only(&names).map_err(runtime::Refusal::from)?;
+    }
+    Ok(Scenario { file: loaded, registry })
+}
+
+/// The built-in scenario that is nothing without a file.
+const RECORDED: &str = "recorded";
+
+/// The driver that plays a file, and the folder in which it lies. The log keeps the name of the file and not where it lay.
+fn recording(path: &Path) -> Result<(String, PathBuf), Failure> {
+    let unreadable = |error: io::Error| Failure::new(format!("{} cannot be read: {error}", path.display()));
+    let name = path.file_name().map(|name| name.to_string_lossy().into_owned()).unwrap_or_default();
+    let folder = path.parent().unwrap_or(Path::new("")).to_owned();
+    if !path.is_file() {
+        return Err(match path.metadata() {
+            Ok(_) => Failure::new(format!("{} is no file", path.display())),
+            Err(error) => unreadable(error),
+        });
+    }
+    if path.extension().is_some_and(|ending| ending == "mcap") {
+        return Ok((format!("replay:{name}"), folder));
+    }
+    if !carmen::open(path).map_err(unreadable)?.records.is_empty() {
+        return Ok((format!("carmen:{name}"), folder));
+    }
+    if !ticks::open(path).map_err(unreadable)?.records.is_empty() {
+        return Ok((format!("ticks:{name}"), folder));
+    }
+    Err(Failure::new(format!("{} is neither a CARMEN log nor a file of wheel counts", path.display()))
+        .help("logs of our own end in .mcap"))
+}
+
+/// The clock that was asked for, or the one that fits the robots.
+pub(super) fn clock(args: &RunArgs, ready: &Ready) -> Result<ClockChoice, Failure> {
+    match args.clock {
+        Some(ClockChoice::Sim) if ready.needs_wall => {
+            Err(Failure::new("a robot of this plan is a thing in the world: only the wall clock will do"))
+        }
+        Some(ClockChoice::Wall) if args.speed.is_some() => {
+            Err(Failure::new("the wall clock has one speed").help("--speed goes with --clock sim"))
+        }
+        Some(clock) => Ok(clock),
+        None if ready.needs_wall => Ok(ClockChoice::Wall),
+        None => Ok(ClockChoice::Sim),
+    }
+}

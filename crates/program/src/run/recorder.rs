@@ -1,0 +1,238 @@
+//! From what agents send to the log file.
+
+use std::collections::HashMap;
+use std::path::Path;
+use std::sync::{Arc, Mutex, PoisonError};
+
+use record::log::{ChannelId, RunInfo, Severity, Tally, WriteError, Writer};
+use record::picture;
+use runtime::{LogChoice, Recorder};
+use types::cdr::{self, NoElement};
+use types::definition::Definition;
+use types::message::{Message, describe};
+use types::messages::{Image, Odometry};
+use types::{Duration, Header, Time};
+
+use super::judge::Facts;
+use super::prepare::Ready;
+use crate::terminal;
+
+/// What became of a log, for the summary.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct LogOutcome {
+    /// How many messages went where.
+    pub(crate) tally: Tally,
+    /// How many pictures are in it.
+    pub(crate) images: u64,
+    /// What went wrong, each thing once.
+    pub(crate) errors: Vec<String>,
+    /// Whether the file was ended.
+    pub(crate) finished: bool,
+}
+
+/// Shared between the log's thread, which writes it, and the summary.
+pub(crate) type SharedOutcome = Arc<Mutex<LogOutcome>>;
+
+/// Writes everything that is sent on topics `/agent/port`, notes on `/rosout`, pictures packed and at a rate of their own, and
+/// what the judge saw on `/truth/NAME`.
+pub(crate) struct LogFile {
+    writer: Option<Writer>,
+    channels: HashMap<String, ChannelId>,
+    pictures: HashMap<String, Pictures>,
+    /// The least time between two pictures of an output.
+    picture_gap: Duration,
+    facts: Facts,
+    fact_numbers: HashMap<String, u64>,
+    scratch: cdr::Writer,
+    outcome: SharedOutcome,
+}
+
+/// An output of pictures.
+struct Pictures {
+    channel: ChannelId,
+    next: Time,
+}
+
+/// The name of the messages of cameras.
+const IMAGE: &str = Image::NAME;
+
+impl LogFile {
+    /// Begins a log. `images` is how many pictures a second are kept of each output.
+    pub(crate) fn create(path: &Path, run: &RunInfo, images: f64, facts: Facts) -> Result<(LogFile, SharedOutcome), WriteError> {
+        let outcome = SharedOutcome::default();
+        let file = LogFile {
+            writer: Some(Writer::create(path, run)?),
+            channels: HashMap::new(),
+            pictures: HashMap::new(),
+            picture_gap: if images > 0.0 { Duration::from_seconds(1.0 / images) } else { Duration(i64::MAX) },
+            facts,
+            fact_numbers: HashMap::new(),
+            scratch: cdr::Writer::new(),
+            outcome: outcome.clone(),
+        };
+        Ok((file, outcome))
+    }
+
+    fn outcome(&self) -> std::sync::MutexGuard<'_, LogOutcome> {
+        self.outcome.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// An error is told once, to people at once and in the summary again; the run goes on.
+    fn failed(&self, error: impl std::fmt::Display) {
+        let text = error.to_string();
+        let mut outcome = self.outcome();
+        if !outcome.errors.contains(&text) {
+            terminal::tell(&format!("warning: {text}"));
+            outcome.errors.push(text);
+        }
+    }
+
+    fn channel(&mut self, topic: &str, definition: &dyn Fn() -> Definition) -> Option<ChannelId> {
+        if let Some(known) = self.channels.get(topic) {
+            return Some(*known);
+        }
+        match self.writer.as_mut()?.channel(topic, &definition()) {
+            Ok(channel) => {
+                self.channels.insert(topic.to_owned(), channel);
+                Some(channel)
+            }
+            Err(error) => {
+                self.failed(error);
+                None
+            }
+        }
+    }
+
+    fn write(&mut self, topic: &str, definition: &dyn Fn() -> Definition, header: &Header, cdr: &[u8]) {
+        let Some(channel) = self.channel(topic, definition) else { return };
+        if let Some(Err(error)) = self.writer.as_mut().map(|out| out.write(channel, header, header.stamp, cdr)) {
+            self.failed(error);
+        }
+    }
+
+    /// What the judge saw before `time`. All of it is there when a message of that time arrives, so the order is always the same.
+    fn write_facts(&mut self, time: Time) {
+        while let Some(fact) = self.facts.before(time) {
+            let topic = format!("/truth/{}", fact.odometry.body);
+            let number = self.fact_numbers.entry(topic.clone()).or_default();
+            let header = Header { stamp: fact.time, sequence: *number, ..Header::default() };
+            *number += 1;
+            let mut scratch = std::mem::take(&mut self.scratch);
+            scratch.clear();
+            fact.odometry.encode(&[] as &[NoElement], fact.time, &mut scratch);
+            self.write(&topic, &describe::<Odometry>, &header, scratch.bytes());
+            self.scratch = scratch;
+        }
+    }
+
+    fn write_picture(&mut self, topic: &str, header: &Header, cdr: &[u8]) {
+        let topic = format!("{topic}/compressed");
+        let Some(channel) = self.channel(&topic, &picture::compressed_image) else { return };
+        let gap = self.picture_gap;
+        let output = self.pictures.entry(topic).or_insert(Pictures { channel, next: header.stamp });
+        // Pictures come a little early or late; half a thousandth of the gap is no reason to leave one out.
+        if header.stamp + Duration(gap.0 / 2000) < output.next {
+            return;
+        }
+        output.next = output.next.saturating_add(gap).max(header.stamp);
+        let channel = output.channel;
+        let packed = packed(cdr, header.stamp);
+        match packed {
+            Ok(packed) => {
+                if let Some(Err(error)) =
+                    self.writer.as_mut().map(|out| out.write(channel, header, header.stamp, &packed))
+                {
+                    self.failed(error);
+                }
+                self.outcome().images += 1;
+            }
+            Err(error) => self.failed(error),
+        }
+    }
+}
+
+fn packed(cdr: &[u8], stamp: Time) -> Result<Vec<u8>, String> {
+    let mut pixels = Vec::new();
+    let mut reader = cdr::Reader::new(cdr).map_err(|error| error.to_string())?;
+    let image = Image::decode(&mut reader, &mut pixels).map_err(|error| error.to_string())?;
+    picture::compress(&image, &pixels, stamp).map_err(|error| error.to_string())
+}
+
+impl Recorder for LogFile {
+    fn message(&mut self, topic: &str, definition: &dyn Fn() -> Definition, header: &Header, cdr: &[u8]) {
+        self.write_facts(header.stamp);
+        let topic = topic_of(topic);
+        // The definition is made only once for a topic; to ask for its name is to make it.
+        let is_picture = match self.pictures.contains_key(&format!("{topic}/compressed")) {
+            true => true,
+            false => !self.channels.contains_key(&topic) && definition().name == IMAGE,
+        };
+        if is_picture {
+            self.write_picture(&topic, header, cdr);
+        } else {
+            self.write(&topic, definition, header, cdr);
+        }
+    }
+
+    fn note(&mut self, time: Time, who: &str, text: &str) {
+        self.write_facts(time);
+        let severity = severity(text);
+        if let Some(Err(error)) = self.writer.as_mut().map(|out| out.note(time, severity, who, text)) {
+            self.failed(error);
+        }
+    }
+
+    fn finish(&mut self) {
+        self.write_facts(Time::NEVER);
+        let Some(writer) = self.writer.take() else { return };
+        let before = writer.tally();
+        match writer.finish() {
+            Ok(tally) => self.outcome().tally = tally,
+            Err(error) => {
+                self.failed(error);
+                self.outcome().tally = before;
+            }
+        }
+        self.outcome().finished = true;
+    }
+}
+
+/// `agent.port` as a topic.
+fn topic_of(output: &str) -> String {
+    format!("/{}", output.replace('.', "/"))
+}
+
+/// How grave a note is. Agents say only what; the supervisor's own words tell the rest.
+fn severity(text: &str) -> Severity {
+    if ["panicked", "did not return", "failed"].iter().any(|word| text.contains(word)) {
+        Severity::Error
+    } else if ["latch is set", "refused", "standing", "faults"].iter().any(|word| text.contains(word)) {
+        Severity::Warning
+    } else {
+        Severity::Info
+    }
+}
+
+/// Which outputs are logged: all, and of pictures only about as many as are kept.
+pub(crate) fn choice(ready: &Ready, images: f64) -> LogChoice {
+    let periods = ready.robots.iter().filter_map(|robot| robot.description.periods.image);
+    let fastest = periods.filter(|period| *period > Duration::ZERO).min();
+    let every = match fastest {
+        Some(period) if images > 0.0 => (1.0 / (images * period.seconds())).round().max(1.0) as u32,
+        Some(_) => 0,
+        // A recording's pictures come as they come.
+        None => u32::from(images > 0.0),
+    };
+    LogChoice::by(move |_, message| if message.name == IMAGE { every } else { 1 })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn outputs_become_topics() {
+        assert_eq!(topic_of("sonar.filtered"), "/sonar/filtered");
+        assert_eq!(topic_of("left.arm.speed"), "/left/arm/speed");
+    }
+}

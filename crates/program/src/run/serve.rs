@@ -1,0 +1,186 @@
+//! What a run does for those who control it from another process.
+
+use std::collections::VecDeque;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Arc, Mutex, PoisonError};
+use std::thread::JoinHandle;
+use std::time::Duration as HostDuration;
+
+use control::{Hooks, RunFolder, Server};
+use hardware::Latch;
+use hardware::latch::Cause;
+use record::{dynamic, schema::Schema};
+use runtime::{Control, Refusal};
+use serde_json::{Value as Json, json};
+use types::definition::Definition;
+use types::message::Message as _;
+use types::messages::Decision;
+use types::value::Entry;
+use types::{Time, cdr};
+
+use super::prepare::Ready;
+use crate::terminal;
+
+/// The control interface of a run, while it lasts.
+pub(super) struct Serving {
+    _server: Server,
+    over: Arc<AtomicBool>,
+    listener: Option<JoinHandle<()>>,
+}
+
+/// How many changes of the decision are kept.
+const KEPT: usize = 256;
+/// How often the decisions are fetched: before a tap is full, however fast the run.
+const FETCH: HostDuration = HostDuration::from_millis(10);
+
+/// Opens the control interface. A run without it is still a run, so what goes wrong is told and no more.
+pub(super) fn start(ready: &Ready, control: &Control, _: &Arc<AtomicBool>) -> Option<Serving> {
+    let warn = |text: String| {
+        terminal::tell(&format!("warning: {text}; nobody can control this run from outside"));
+        None
+    };
+    let folder = match RunFolder::open() {
+        Ok(folder) => folder,
+        Err(error) => return warn(error.to_string()),
+    };
+    let decisions = Arc::new(Mutex::new(VecDeque::new()));
+    let decider = ready.plan.agents.iter().find(|agent| agent.kind == DECIDER).map(|agent| agent.name.clone());
+    let hooks = RunHooks {
+        control: control.clone(),
+        latches: ready.robots.iter().map(|robot| robot.latch.clone()).collect(),
+        decisions: decisions.clone(),
+        decides: decider.is_some(),
+    };
+    let server = match Server::start(&folder, &ready.plan.name, control.clone(), Arc::new(hooks)) {
+        Ok(server) => server,
+        Err(error) => return warn(error.to_string()),
+    };
+    let over = Arc::new(AtomicBool::new(false));
+    let listener = decider.and_then(|decider| listen(control.clone(), decider, decisions, over.clone()));
+    Some(Serving { _server: server, over, listener })
+}
+
+impl Drop for Serving {
+    fn drop(&mut self) {
+        self.over.store(true, Ordering::Release);
+        if let Some(thread) = self.listener.take() {
+            thread.thread().unpark();
+            // One that panicked has said so.
+            let _ = thread.join();
+        }
+    }
+}
+
+/// The type of agent that decides.
+pub(super) const DECIDER: &str = "decision-maker";
+
+type Decisions = Arc<Mutex<VecDeque<(Time, Decision)>>>;
+
+/// Keeps the changes of the decision.
+fn listen(control: Control, decider: String, decisions: Decisions, over: Arc<AtomicBool>) -> Option<JoinHandle<()>> {
+    let work = move || {
+        let Ok(tap) = control.tap(&format!("{decider}.decision")) else { return };
+        while !over.load(Ordering::Acquire) {
+            for heard in tap.take().0 {
+                if let Some(decision) = decoded(&heard.cdr) {
+                    keep(&decisions, heard.header.stamp, decision);
+                }
+            }
+            std::thread::park_timeout(FETCH);
+        }
+    };
+    std::thread::Builder::new().name("sinew-why".into()).spawn(work).ok()
+}
+
+/// A decision from its bytes.
+pub(super) fn decoded(bytes: &[u8]) -> Option<Decision> {
+    Decision::decode(&mut cdr::Reader::new(bytes).ok()?, &mut Vec::new()).ok()
+}
+
+fn keep(decisions: &Decisions, time: Time, decision: Decision) {
+    let mut decisions = decisions.lock().unwrap_or_else(PoisonError::into_inner);
+    let same = |last: &Decision| last.situation == decision.situation && last.active == decision.active;
+    if decisions.back().is_some_and(|(_, last)| same(last)) {
+        return;
+    }
+    if decisions.len() == KEPT {
+        decisions.pop_front();
+    }
+    decisions.push_back((time, decision));
+}
+
+struct RunHooks {
+    control: Control,
+    latches: Vec<Latch>,
+    decisions: Decisions,
+    decides: bool,
+}
+
+impl RunHooks {
+    fn now(&self) -> Time {
+        self.control.view().map_or(Time::ZERO, |view| view.now)
+    }
+
+    fn robots(&self) -> Result<(), Refusal> {
+        if self.latches.is_empty() { Err(Refusal::new("this system has no robot")) } else { Ok(()) }
+    }
+}
+
+impl Hooks for RunHooks {
+    fn stop(&self, _: &str) -> Result<(), Refusal> {
+        self.robots()?;
+        // First stop, then look at the clock: asking for the time can wait for a step.
+        self.latches.iter().for_each(|latch| latch.set(Cause::Person, Time::ZERO));
+        Ok(())
+    }
+
+    fn reset(&self) -> Result<(), Refusal> {
+        self.robots()?;
+        let now = self.now();
+        self.latches.iter().for_each(|latch| {
+            latch.reset(now);
+        });
+        Ok(())
+    }
+
+    fn why(&self, n: usize) -> Result<Json, Refusal> {
+        if !self.decides {
+            return Err(Refusal::new("nobody in this system decides").help("a decision maker has the type \"decision-maker\""));
+        }
+        let decisions = self.decisions.lock().unwrap_or_else(PoisonError::into_inner);
+        let last = decisions.iter().skip(decisions.len().saturating_sub(n));
+        let rows = last.map(|(time, decision)| {
+            let weights = decision.rows.iter().map(|row| (row.agent.as_str().to_owned(), Json::from(row.weight)));
+            json!({
+                "time_s": time.seconds(),
+                "situation": decision.situation.as_str(),
+                "before": decision.before.as_str(),
+                "active": decision.active.as_str(),
+                "danger": decision.danger,
+                "desire": decision.desire,
+                "weights": weights.collect::<serde_json::Map<_, _>>(),
+            })
+        });
+        Ok(rows.collect::<Vec<_>>().into())
+    }
+
+    fn decode(&self, definition: &Definition, cdr: &[u8]) -> Result<Json, String> {
+        let schema = schema(definition)?;
+        let value = dynamic::decode_short(&schema, cdr, SHORT).map_err(|error| error.to_string())?;
+        Ok(control::json::to_json(&value))
+    }
+
+    fn encode(&self, definition: &Definition, message: &Json) -> Result<Vec<u8>, String> {
+        let entry = Entry { value: control::json::from_json(message), at: Default::default() };
+        dynamic::encode(&schema(definition)?, &entry).map_err(|mistakes| {
+            mistakes.iter().map(ToString::to_string).collect::<Vec<_>>().join("; ")
+        })
+    }
+}
+
+/// Of a row with more values than this the rest is left out: nobody reads the pixels of a picture.
+const SHORT: usize = 400;
+
+fn schema(definition: &Definition) -> Result<Schema, String> {
+    Schema::parse(definition.name, &definition.text()).map_err(|error| error.to_string())
+}

@@ -1,0 +1,485 @@
+//! What a run comes to, for people and for programs.
+
+use std::path::PathBuf;
+
+use runtime::{AgentView, CannotRun, Figure, Incident, Report};
+use serde_json::{Value as Json, json};
+use types::{Duration, Time};
+
+use super::judge;
+use super::prepare::Ready;
+use super::recorder::LogOutcome;
+use crate::terminal::paint;
+
+/// What became of a robot.
+#[derive(Clone, Debug)]
+pub(crate) struct RobotOutcome {
+    pub(crate) name: String,
+    /// What the judge knows; nothing for a robot that is not simulated.
+    pub(crate) truth: Option<sim::Truth>,
+    pub(crate) commands: u64,
+    pub(crate) stale: u64,
+    pub(crate) clamped: u64,
+    pub(crate) latched: bool,
+    /// Whether its commands went nowhere, because it is a recording.
+    pub(crate) shadow: bool,
+    pub(crate) report: Option<hardware::Report>,
+}
+
+/// What a run comes to.
+#[derive(Clone, Debug)]
+pub(crate) struct Summary {
+    pub(crate) system: String,
+    pub(crate) seed: u64,
+    /// `sim` or `wall`.
+    pub(crate) clock: &'static str,
+    pub(crate) time: Duration,
+    pub(crate) wall: f64,
+    /// Whether the goal was met, nothing for a plan without one; and why.
+    pub(crate) met: Option<bool>,
+    pub(crate) why: String,
+    pub(crate) ended: String,
+    pub(crate) robots: Vec<RobotOutcome>,
+    pub(crate) agents: Vec<AgentView>,
+    pub(crate) sent: u64,
+    pub(crate) dropped: u64,
+    pub(crate) refused: u64,
+    pub(crate) log_dropped: u64,
+    pub(crate) incidents: Vec<Incident>,
+    /// When the run began on its own clock.
+    pub(crate) begun: Time,
+    pub(crate) log: Option<LogOutcome>,
+    /// Pictures a second that were to be kept.
+    pub(crate) images: f64,
+    pub(crate) files: Vec<PathBuf>,
+}
+
+impl Summary {
+    pub(crate) fn new(ready: &Ready, seed: u64, clock: &'static str, report: Report) -> Summary {
+        let truth = ready.truth.as_ref();
+        let robots: Vec<RobotOutcome> = ready
+            .robots
+            .iter()
+            .map(|robot| RobotOutcome {
+                name: robot.name.clone(),
+                truth: truth.and_then(|truth| truth.robot(&robot.name)).map(|moment| moment.truth),
+                commands: robot.counts.commands.get(),
+                stale: robot.counts.stale.get(),
+                clamped: robot.counts.clamped.get(),
+                latched: robot.latch.is_set(),
+                shadow: robot.description.clock == hardware::ClockKind::Recorded,
+                report: robot.report.clone(),
+            })
+            .collect();
+        let met = ready.goal.as_ref().and(truth).map(hardware::simulated::Truth::met);
+        let why = match truth.filter(|_| met.is_some()) {
+            Some(truth) => {
+                let each = robots.iter().filter_map(|robot| {
+                    let why = truth.why(&robot.name)?;
+                    Some(if robots.len() > 1 { format!("{}: {why}", robot.name) } else { why })
+                });
+                each.collect::<Vec<_>>().join("; ")
+            }
+            None => report.ended.clone(),
+        };
+        let wires = &report.view.wires;
+        Summary {
+            system: report.view.name.clone(),
+            seed,
+            clock,
+            time: report.time,
+            wall: report.wall,
+            met,
+            why,
+            ended: report.ended,
+            robots,
+            sent: wires.iter().map(|wire| wire.sent).sum(),
+            dropped: wires.iter().map(|wire| wire.dropped + wire.expired).sum(),
+            refused: wires.iter().map(|wire| wire.refused).sum(),
+            log_dropped: report.log_dropped,
+            incidents: report.incidents,
+            begun: Time(report.view.now.0 - report.time.0),
+            agents: report.view.agents,
+            log: None,
+            images: 0.0,
+            files: Vec::new(),
+        }
+    }
+
+    /// Whether the run did what it was to do: met its goal, or without one ran to its end.
+    pub(crate) fn is_success(&self) -> bool {
+        self.met.unwrap_or(self.ended != judge::INTERRUPTED)
+    }
+
+    fn truths(&self) -> impl Iterator<Item = &sim::Truth> {
+        self.robots.iter().filter_map(|robot| robot.truth.as_ref())
+    }
+
+    /// Collisions of all robots; nothing where nobody knows.
+    pub(crate) fn collisions(&self) -> Option<u32> {
+        self.truths().map(|truth| truth.collisions).reduce(|a, b| a + b)
+    }
+
+    /// The smallest distance of any robot to anything (m).
+    pub(crate) fn closest(&self) -> Option<f64> {
+        self.truths().map(|truth| truth.closest).reduce(f64::min)
+    }
+
+    /// How far all robots went together (m).
+    pub(crate) fn distance(&self) -> Option<f64> {
+        self.truths().map(|truth| truth.distance).reduce(|a, b| a + b)
+    }
+
+    fn count(&self, of: impl Fn(&AgentView) -> u64) -> u64 {
+        self.agents.iter().map(of).sum()
+    }
+
+    /// The documented shape of a run.
+    pub(crate) fn to_json(&self) -> Json {
+        let agents: Vec<Json> = self.agents.iter().map(agent_json).collect();
+        let robots: Vec<Json> = self.robots.iter().map(robot_json).collect();
+        let incidents = self.incidents.iter().map(|incident| {
+            json!({"time_s": (incident.time - self.begun).seconds(), "agent": incident.agent, "what": incident.what})
+        });
+        json!({
+            "system": self.system,
+            "seed": self.seed,
+            "clock": self.clock,
+            "time_s": self.time.seconds(),
+            "wall_s": self.wall,
+            "ended": self.ended,
+            "goal": {"met": self.met, "why": self.why},
+            "collisions": self.collisions(),
+            "closest_m": self.closest(),
+            "distance_m": self.distance(),
+            "deadlines": {
+                "of": self.count(|agent| agent.counts.releases),
+                "missed": self.count(|agent| agent.counts.missed),
+                "stalled": self.count(|agent| agent.counts.stalled),
+            },
+            "messages": {"sent": self.sent, "dropped": self.dropped, "refused": self.refused},
+            "agents": agents,
+            "robots": robots,
+            "incidents": incidents.collect::<Vec<_>>(),
+            "log": self.log.as_ref().map(|log| json!({
+                "messages": log.tally.safe,
+                "lost": log.tally.lost + self.log_dropped,
+                "images": log.images,
+                "images_hz": self.images,
+                "errors": log.errors,
+            })),
+            "files": self.files.iter().map(|file| file.display().to_string()).collect::<Vec<_>>(),
+        })
+    }
+
+    /// What people read at the end of a run.
+    pub(crate) fn to_text(&self, coloured: bool) -> String {
+        let mut out = String::new();
+        let mut line = |text: String| {
+            out.push_str(&text);
+            out.push('\n');
+        };
+        let verdict = match self.met {
+            Some(true) => paint(coloured, "1;32", "goal met"),
+            Some(false) => paint(coloured, "1;31", "goal not met"),
+            None => paint(coloured, "1", "ended"),
+        };
+        line(format!("{} (seed {}): {verdict}: {}", self.system, self.seed, self.why));
+        if self.met == Some(false) && self.ended != judge::DECIDED {
+            line(format!("  ended        {}", self.ended));
+        }
+        line(format!("  time         {}", self.times()));
+        for robot in &self.robots {
+            robot_lines(robot, self.robots.len() > 1).into_iter().for_each(&mut line);
+        }
+        line(format!("  deadlines    {}", self.deadlines()));
+        line(format!("  messages     {}", self.messages()));
+        for text in self.told() {
+            line(format!("  happened     {text}"));
+        }
+        if let Some(text) = self.granted() {
+            line(format!("  real time    {text}"));
+        }
+        line(String::new());
+        line(agent_table(&self.agents));
+        if let Some(log) = &self.log {
+            line(format!("  log          {}", self.log_line(log)));
+            log.errors.iter().for_each(|error| line(format!("  log          {}", paint(coloured, "1;31", error))));
+        }
+        for (i, file) in self.files.iter().enumerate() {
+            line(format!("  {:<12} {}", if i == 0 { "files" } else { "" }, file.display()));
+        }
+        out
+    }
+
+    fn times(&self) -> String {
+        match self.clock {
+            "sim" => format!(
+                "{} simulated in {:.2} s ({:.0} × real time)",
+                seconds(self.time.seconds()),
+                self.wall,
+                self.time.seconds() / self.wall.max(1e-9)
+            ),
+            _ => format!("{} on the wall clock", seconds(self.time.seconds())),
+        }
+    }
+
+    fn deadlines(&self) -> String {
+        let (of, missed) = (self.count(|agent| agent.counts.releases), self.count(|agent| agent.counts.missed));
+        let stalled = self.count(|agent| agent.counts.stalled);
+        let mut text = format!("{missed} of {of} missed");
+        if stalled > 0 {
+            text += &format!(", {stalled} of them while the machine stood still for everybody");
+        }
+        text
+    }
+
+    fn messages(&self) -> String {
+        let mut text = format!("{} sent, {} dropped", self.sent, self.dropped);
+        if self.refused > 0 {
+            text += &format!(", {} given back to their senders", self.refused);
+        }
+        text
+    }
+
+    /// What the supervisor did, in sentences; a death and the start after it are one.
+    fn told(&self) -> Vec<String> {
+        let mut told = Vec::new();
+        let mut done = vec![false; self.incidents.len()];
+        for (i, incident) in self.incidents.iter().enumerate() {
+            if done[i] {
+                continue;
+            }
+            let at = (incident.time - self.begun).seconds();
+            let mut text = match incident.agent.as_str() {
+                "plan" => format!("at {} the plan {}", seconds(at), incident.what),
+                agent => format!("at {} {agent} {}", seconds(at), incident.what),
+            };
+            let again = (i + 1..self.incidents.len()).find(|later| self.incidents[*later].agent == incident.agent);
+            if let Some(later) = again.filter(|later| self.incidents[*later].what == STARTED_AGAIN) {
+                let after = (self.incidents[later].time - incident.time).seconds();
+                text += &format!("; started again {after:.1} s later");
+                done[later] = true;
+            }
+            told.push(text);
+        }
+        told
+    }
+
+    /// Asking for real time and not getting it is said aloud.
+    fn granted(&self) -> Option<String> {
+        if self.clock != "wall" {
+            return None;
+        }
+        let refused: Vec<&AgentView> = self.agents.iter().filter(|agent| agent.asked != agent.granted).collect();
+        let first = refused.first()?;
+        Some(format!(
+            "{} of {} agents did not get what they asked for ({}: asked {}, granted {}); \"sinew doctor\" says why",
+            refused.len(),
+            self.agents.len(),
+            first.name,
+            first.asked,
+            first.granted
+        ))
+    }
+
+    fn log_line(&self, log: &LogOutcome) -> String {
+        let mut text = format!("{} messages", log.tally.safe);
+        if self.images > 0.0 && log.images > 0 {
+            text += &format!(", images at {} Hz, compressed ({} of them)", self.images, log.images);
+        } else if self.images <= 0.0 {
+            text += ", no images";
+        }
+        let lost = log.tally.lost + self.log_dropped;
+        if lost > 0 {
+            text += &format!(", {lost} messages lost");
+        }
+        text
+    }
+}
+
+/// The supervisor's words for a restart.
+const STARTED_AGAIN: &str = "started again";
+
+fn robot_lines(robot: &RobotOutcome, several: bool) -> Vec<String> {
+    let mut lines = Vec::new();
+    let who = if several { format!("{}: ", robot.name) } else { String::new() };
+    if let Some(truth) = &robot.truth {
+        let collisions = match truth.collisions {
+            0 => "no collisions".to_owned(),
+            1 => "1 collision".to_owned(),
+            n => format!("{n} collisions"),
+        };
+        let closest = if truth.closest >= sim::CLEARANCE_LIMIT {
+            "nothing was ever near".to_owned()
+        } else {
+            format!("closest {:.2} m", truth.closest)
+        };
+        lines.push(format!("  safety       {who}{collisions}, {closest}"));
+        lines.push(format!("  way          {who}{:.1} m", truth.distance));
+    }
+    if robot.shadow {
+        lines.push(format!(
+            "  shadow       {who}{} commands that a robot would have followed; the recording moves as it did",
+            robot.commands
+        ));
+    }
+    if let Some(report) = &robot.report {
+        lines.push(format!("  recording    {who}{report}"));
+        for bad in &report.told {
+            lines.push(format!("               line {}: {}", bad.line, bad.why));
+        }
+    }
+    if robot.stale > 0 && !robot.shadow {
+        lines.push(format!("  gate         {who}stood {} times because no new command came in time", robot.stale));
+    }
+    if robot.latched {
+        lines.push(format!("  latch        {who}set: the robot stands until it is reset"));
+    }
+    lines
+}
+
+fn agent_json(agent: &AgentView) -> Json {
+    json!({
+        "name": agent.name,
+        "kind": agent.kind,
+        "executor": agent.executor,
+        "asked": agent.asked,
+        "granted": agent.granted,
+        "state": agent.state.name(),
+        "releases": agent.counts.releases,
+        "missed": agent.counts.missed,
+        "stalled": agent.counts.stalled,
+        "skipped": agent.counts.skipped,
+        "restarts": agent.counts.restarts,
+        "exec": figure_json("exec", &agent.exec),
+        "jitter": figure_json("jitter", &agent.jitter),
+        "response": figure_json("response", &agent.response),
+    })
+}
+
+/// The documented shape of a figure of spans of time.
+pub(crate) fn figure_json(name: &str, figure: &Figure) -> Json {
+    json!({
+        "name": name,
+        "unit": "ns",
+        "n": figure.n,
+        "min": figure.min,
+        "p50": figure.p50,
+        "p99": figure.p99,
+        "p999": figure.p999,
+        "max": figure.max,
+    })
+}
+
+fn robot_json(robot: &RobotOutcome) -> Json {
+    json!({
+        "name": robot.name,
+        "collisions": robot.truth.map(|truth| truth.collisions),
+        "closest_m": robot.truth.map(|truth| truth.closest),
+        "distance_m": robot.truth.map(|truth| truth.distance),
+        "commands": robot.commands,
+        "stale": robot.stale,
+        "clamped": robot.clamped,
+        "latched": robot.latched,
+        "shadow": robot.shadow,
+        "recording": robot.report.as_ref().map(|report| json!({
+            "lines": report.lines,
+            "scans": report.scans,
+            "odometry": report.odometry,
+            "bad": report.bad,
+            "bad_lines": report.told.iter().map(|told| json!({"line": told.line, "why": told.why})).collect::<Vec<_>>(),
+        })),
+    })
+}
+
+/// One line an agent: what it asked for and got, and how it did.
+pub(crate) fn agent_table(agents: &[AgentView]) -> String {
+    let mut rows = vec![
+        ["agent", "asked", "granted", "releases", "missed", "restarts", "exec p50", "exec max"].map(str::to_owned),
+    ];
+    for agent in agents {
+        rows.push([
+            agent.name.clone(),
+            agent.asked.clone(),
+            agent.granted.clone(),
+            agent.counts.releases.to_string(),
+            agent.counts.missed.to_string(),
+            agent.counts.restarts.to_string(),
+            span(agent.exec.p50),
+            span(agent.exec.max),
+        ]);
+    }
+    table(&rows, 3)
+}
+
+/// Rows in columns; the first `left` columns are words, the others numbers.
+pub(crate) fn table<const N: usize>(rows: &[[String; N]], left: usize) -> String {
+    let mut widths = [0; N];
+    for row in rows {
+        for (width, cell) in widths.iter_mut().zip(row) {
+            *width = (*width).max(cell.chars().count());
+        }
+    }
+    let mut out = String::new();
+    for row in rows {
+        let mut line = String::from("  ");
+        for (i, (cell, width)) in row.iter().zip(widths).enumerate() {
+            line += &if i < left { format!("{cell:<width$}  ") } else { format!("{cell:>width$}  ") };
+        }
+        out += line.trim_end();
+        out.push('\n');
+    }
+    out
+}
+
+/// A span of time in nanoseconds, as people read it.
+pub(crate) fn span(nanos: f64) -> String {
+    match nanos {
+        n if n <= 0.0 => "0".to_owned(),
+        n if n < 1e3 => format!("{n:.0} ns"),
+        n if n < 1e5 => format!("{:.1} µs", n * 1e-3),
+        n if n < 1e6 => format!("{:.0} µs", n * 1e-3),
+        n if n < 1e9 => format!("{:.1} ms", n * 1e-6),
+        n => format!("{:.2} s", n * 1e-9),
+    }
+}
+
+/// A time in seconds, as people read it.
+pub(crate) fn seconds(seconds: f64) -> String {
+    let text = format!("{seconds:.2}");
+    let text = text.trim_end_matches('0').trim_end_matches('.');
+    format!("{text} s")
+}
+
+/// Why a plan did not run, as a failure with its places.
+pub(crate) fn failure(error: CannotRun, sources: &crate::file::Sources) -> crate::Failure {
+    match error {
+        CannotRun::Mistakes(list) => crate::file::Mistakes { sources: sources.clone(), list }.into(),
+        CannotRun::Refused(refusal) => refusal.into(),
+        // These are no matter of the file but of an agent or of the machine.
+        other @ (CannotRun::NoThread(_) | CannotRun::Stuck { .. } | CannotRun::Endless { .. }) => {
+            crate::Failure::new(other.to_string()).code(1)
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn spans_are_read_with_their_unit() {
+        assert_eq!(
+            [0.0, 999.0, 1500.0, 250_000.0, 2.5e6, 3e9].map(span),
+            ["0", "999 ns", "1.5 µs", "250 µs", "2.5 ms", "3.00 s"].map(str::to_owned)
+        );
+        assert_eq!([30.0, 30.1, 0.25].map(seconds), ["30 s", "30.1 s", "0.25 s"].map(str::to_owned));
+    }
+
+    #[test]
+    fn columns_are_as_wide_as_their_widest_cell() {
+        let rows = [["a", "n"], ["long", "10"]].map(|row| row.map(str::to_owned));
+        assert_eq!(table(&rows, 1), "  a      n\n  long  10\n");
+    }
+}

@@ -1,0 +1,260 @@
+//! The JSON schema of system files, for editors: the agent types of this program with their parameters, docs and ranges.
+
+use runtime::{AgentType, ExecutorPlan, Overload, PortInfo, Registry};
+use serde_json::{Map, Value as Json, json};
+use types::params::ParamField;
+use types::value::{Table, Value};
+use types::{Category, Priority};
+
+use crate::file::{SECTIONS, Shelf};
+
+/// The schema of system files (JSON Schema, draft 2020-12). Agents are told apart by their `is`; their inputs, parameters and
+/// ranges are those of the registry.
+///
+/// Names that a file makes itself (ports of its agents, executors) are checked by form only: `sinew check` does the rest.
+pub fn schema(registry: &Registry) -> Json {
+    let kinds = registry.types().iter().filter(|kind| kind.kind != "robot");
+    let mut agents: Vec<Json> = kinds.map(agent).collect();
+    agents.push(group());
+    let [name, world, robot_, executor_, agent_, wires_, decide_, goal_, vary_, at_] = SECTIONS;
+    let properties = object([
+        (name, json!({"type": "string", "description": "The name of the system."})),
+        (world, world_()),
+        (robot_, named(robot(registry.get("robot")), "The robots.")),
+        (executor_, named(executor(), "Threads besides the usual ones, or in their place.")),
+        (agent_, named(json!({"anyOf": agents}), "The agents.")),
+        (wires_, wires()),
+        (decide_, decide()),
+        (goal_, goal()),
+        (vary_, json!({"type": "object", "description": "What a seed draws: an entry and its distribution."})),
+        (at_, json!({"type": "array", "items": request(), "description": "Timed requests and faults."})),
+    ]);
+    json!({
+        "$schema": "https://json-schema.org/draft/2020-12/schema",
+        "title": "A system file",
+        "type": "object",
+        "additionalProperties": false,
+        "properties": properties,
+        "$defs": {
+            "time": {
+                "type": "string",
+                "pattern": "^\\s*[-+0-9.eE]+\\s*(ns|us|ms|s|min|h)$",
+                "description": "A time: a number and one of ns, us, ms, s, min, h."
+            },
+            "port": {"type": "string", "pattern": "^.+\\..+$", "description": "An agent and its port, as in sonar.filtered."},
+        },
+    })
+}
+
+/// A value of a file as JSON, which the schema can be held against.
+pub fn json_of(value: &Value) -> Json {
+    match value {
+        Value::Bool(b) => json!(b),
+        Value::Int(n) => json!(n),
+        Value::Float(x) => json!(x),
+        Value::Text(text) => json!(text),
+        Value::List(list) => list.iter().map(|entry| json_of(&entry.value)).collect(),
+        Value::Table(table) => json_of_table(table),
+    }
+}
+
+fn json_of_table(table: &Table) -> Json {
+    Json::Object(table.rows().iter().map(|row| (row.key.clone(), json_of(&row.entry.value))).collect())
+}
+
+fn object<'a>(rows: impl IntoIterator<Item = (&'a str, Json)>) -> Json {
+    Json::Object(rows.into_iter().map(|(key, value)| (key.to_owned(), value)).collect::<Map<_, _>>())
+}
+
+fn closed<'a>(rows: impl IntoIterator<Item = (&'a str, Json)>, required: &[&str]) -> Json {
+    json!({"type": "object", "properties": object(rows), "required": required, "additionalProperties": false})
+}
+
+fn named(what: Json, doc: &str) -> Json {
+    json!({"type": "object", "additionalProperties": what, "description": doc})
+}
+
+fn text(doc: &str) -> Json {
+    json!({"type": "string", "description": doc})
+}
+
+fn time(doc: &str) -> Json {
+    json!({"$ref": "#/$defs/time", "description": doc})
+}
+
+fn choice<'a>(words: impl IntoIterator<Item = &'a str>, doc: &str) -> Json {
+    json!({"enum": words.into_iter().collect::<Vec<_>>(), "description": doc})
+}
+
+/// Words that an editor offers where others are allowed too.
+fn open_choice<'a>(words: impl IntoIterator<Item = &'a str>, doc: &str) -> Json {
+    json!({"anyOf": [{"enum": words.into_iter().collect::<Vec<_>>()}, {"type": "string"}], "description": doc})
+}
+
+fn one_or_more(item: &Json) -> Json {
+    json!({"anyOf": [item, {"type": "array", "items": item}]})
+}
+
+/// `[agent.NAME]` with an agent of this type.
+fn agent(kind: &AgentType) -> Json {
+    let takes = |port: &&PortInfo| port.shape.input.is_some();
+    let inputs: Vec<Json> = kind
+        .ports
+        .iter()
+        .filter(takes)
+        .map(|port| json!({"const": port.name, "description": port.doc}))
+        .collect();
+    let on = if inputs.is_empty() { json!(false) } else { one_or_more(&json!({"anyOf": inputs})) };
+    let usual = ExecutorPlan::usual();
+    let executors = usual.iter().map(|executor| executor.name.as_str());
+    let common = [
+        ("is", json!({"const": kind.kind, "description": kind.doc})),
+        ("robot", text("The robot to whose ports it is wired.")),
+        ("period", time("Time between two steps.")),
+        ("period_min", time("The shortest period that its designer allows.")),
+        ("period_max", time("The longest period that its designer allows.")),
+        ("deadline", time("How soon after its release a step must be done; the period when nothing is said.")),
+        ("on", on),
+        ("min_gap", time("The least time between two steps that messages make it run.")),
+        ("executor", open_choice(executors, "The thread it runs on; chosen by the deadline when nothing is said.")),
+        ("on_death", choice(["restart", "leave"], "What happens when it dies.")),
+        ("hang_after", time("How long a step may last before it is taken for one that does not return.")),
+    ];
+    let params = kind.params.iter().map(|field| (field.name, parameter(field)));
+    let mut schema = closed(common.into_iter().chain(params), &["is"]);
+    schema["title"] = json!(kind.kind);
+    schema["description"] = json!(format!("{} {}", kind.doc, ports(kind)));
+    schema
+}
+
+fn ports(kind: &AgentType) -> String {
+    let list = |takes: bool| {
+        let ports = kind.ports.iter().filter(|port| port.shape.input.is_some() == takes);
+        ports.map(|port| port.name).collect::<Vec<_>>().join(", ")
+    };
+    format!("Takes: {}. Gives: {}.", list(true), list(false))
+}
+
+/// The kinds are named in messages for people; this is their meaning for a schema.
+fn parameter(field: &ParamField) -> Json {
+    let mut schema = match &field.default {
+        Value::Bool(_) => json!({"type": "boolean"}),
+        Value::Int(_) => json!({"type": "integer"}),
+        Value::Float(_) => json!({"type": "number"}),
+        Value::List(_) => json!({"type": "array"}),
+        Value::Table(_) => json!({"type": "object"}),
+        Value::Text(_) if field.kind.starts_with("a time") => json!({"$ref": "#/$defs/time"}),
+        Value::Text(_) => json!({"type": "string"}),
+    };
+    if matches!(field.default, Value::Int(_) | Value::Float(_)) {
+        for (key, bound) in [("minimum", field.min), ("maximum", field.max)] {
+            if let Some(bound) = bound {
+                schema[key] = json!(bound);
+            }
+        }
+    }
+    schema["description"] = json!(field.doc);
+    schema["default"] = json_of(&field.default);
+    schema
+}
+
+fn group() -> Json {
+    json!({
+        "title": "a group",
+        "type": "object",
+        "properties": {
+            "use": text("A system file whose agents are added under this name."),
+            "robot": text("The robot to whose ports they are wired."),
+        },
+        "required": ["use"],
+        "additionalProperties": {"type": "object", "description": "Changes to one of its agents."},
+        "description": "The agents of another file under a prefix.",
+    })
+}
+
+fn world_() -> Json {
+    let doc = "The simulated world; absent on a real robot.";
+    json!({"anyOf": [open_choice(Shelf::Worlds.names(), doc), {"type": "object"}], "description": doc})
+}
+
+fn robot(kind: Option<&AgentType>) -> Json {
+    let gate = kind.map(|kind| kind.params.as_slice()).unwrap_or_default();
+    let driver = open_choice(["sim"], "Its driver: sim, carmen:FILE, ticks:FILE or replay:FILE.");
+    let rows = [("driver", driver)].into_iter().chain(gate.iter().map(|field| (field.name, parameter(field))));
+    json!({
+        "type": "object",
+        "properties": object(rows),
+        "required": ["driver"],
+        "description": "A robot: its driver, what its gate lets pass, and entries of its model where it is simulated.",
+    })
+}
+
+fn executor() -> Json {
+    let priority = json!({"type": "integer", "minimum": 1, "maximum": 94,
+        "description": "Real-time priority; an ordinary thread when nothing is said."});
+    let cpus = json!({"type": "array", "items": {"type": "integer", "minimum": 0},
+        "description": "The processors on which it may run."});
+    let spin = time("How long before a release it stops sleeping and watches the clock.");
+    closed([("priority", priority), ("cpus", cpus), ("spin", spin)], &[])
+}
+
+fn wires() -> Json {
+    let whole = |least: i64, doc: &str| json!({"type": "integer", "minimum": least, "description": doc});
+    let policies = [Overload::NewestWins, Overload::OldestWins, Overload::Refuse].map(Overload::name);
+    let rows = [
+        ("to", json!({"$ref": "#/$defs/port"})),
+        ("depth", whole(1, "How many messages wait at most.")),
+        ("overload", choice(policies, "What happens when there is no room.")),
+        ("every", whole(0, "Only every n-th message passes.")),
+        ("priority", choice(Priority::ALL.map(Priority::name), "Only this priority or a higher one passes.")),
+        ("marker", whole(0, "Only this marker passes.")),
+        ("category", choice(Category::ALL.map(Category::name), "Only this category passes.")),
+    ];
+    let target = json!({"anyOf": [{"$ref": "#/$defs/port"}, closed(rows, &["to"])]});
+    // A name without quotes is a table in a table for TOML.
+    let nested = json!({"type": "object"});
+    json!({
+        "type": "object",
+        "additionalProperties": {"anyOf": [target, {"type": "array", "items": target}, nested]},
+        "description": "From each output to its inputs.",
+    })
+}
+
+fn decide() -> Json {
+    let situations: Vec<(&str, Json)> = agents::decision_maker::Situation::ALL
+        .iter()
+        .map(|situation| (situation.name(), json!({"type": "object", "description": "The weight of each agent, from 0 to 1."})))
+        .collect();
+    json!({
+        "type": "object",
+        "properties": object(situations),
+        "additionalProperties": {"type": "object"},
+        "description": "Whose offer counts how much in which situation.",
+    })
+}
+
+fn goal() -> Json {
+    let stage = closed(
+        [
+            ("inside", text("The region in which the robot must be.")),
+            ("near", text("The person or thing to which the robot must be near.")),
+            ("follows", text("The person that the robot must follow.")),
+            ("turned", json!({"type": ["string", "number"], "description": "How far the robot must turn."})),
+            ("distance", json!({"type": "number", "minimum": 0, "description": "How near (m)."})),
+            ("time", time("For how long in all it must follow.")),
+            ("hold", time("For how long the condition must hold without a break.")),
+        ],
+        &[],
+    );
+    let collisions = json!({"type": "integer", "minimum": 0, "description": "How many collisions are forgiven."});
+    let stages = json!({"type": "array", "items": stage, "description": "The stages, one after another."});
+    let mut schema =
+        closed([("within", time("The time for the whole.")), ("collisions", collisions), ("stage", stages)], &["stage"]);
+    schema["description"] = json!("What makes a run a success.");
+    schema
+}
+
+fn request() -> Json {
+    let words = one_or_more(&json!({"type": "string"}));
+    closed([("time", time("When, counted from the start.")), ("do", words)], &["time", "do"])
+}

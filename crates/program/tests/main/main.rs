@@ -1,0 +1,15 @@
+//! What stands in files and what stands on the screen.
+
+mod mistakes;
+mod round_trip;
+mod schema;
+mod templates;
+
+use runtime::{AgentType, Registry};
+
+/// All ready-made agents and the robot.
+fn registry() -> Registry {
+    let mut registry = agents::registry();
+    registry.extend([AgentType::of::<hardware::Robot>()]);
+    registry
+}

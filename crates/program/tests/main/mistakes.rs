@@ -1,0 +1,66 @@
+//! Wrong system files and what is said of them. Each `mistakes/NAME.toml` has its messages in `mistakes/NAME.txt`; with
+//! `BLESS=1` in the environment the messages are written instead of compared, to be read aloud before they are kept.
+
+use std::fs;
+use std::path::Path;
+
+use program::{Failure, Paint, file};
+
+use crate::registry;
+
+/// Files that are parts of others.
+const PARTS: [&str; 1] = ["part"];
+
+#[test]
+fn wrong_files_are_told_what_is_wrong() {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/mistakes");
+    let bless = std::env::var_os("BLESS").is_some();
+    let mut names: Vec<String> = fs::read_dir(&folder)
+        .unwrap()
+        .filter_map(|entry| entry.unwrap().file_name().to_str().unwrap().strip_suffix(".toml").map(str::to_owned))
+        .filter(|name| !PARTS.contains(&name.as_str()))
+        .collect();
+    names.sort();
+    assert!(names.len() >= 12, "{names:?}");
+    let mut wrong = Vec::new();
+    for name in names {
+        let text = fs::read_to_string(folder.join(format!("{name}.toml"))).unwrap();
+        let shown = format!("{name}.toml");
+        let said = match file::read(&text, &shown, Some(&folder), &[], &registry()) {
+            Ok(_) => "no mistake\n".to_owned(),
+            Err(mistakes) => Failure::from(mistakes).to_text(Paint::Plain),
+        };
+        let said = said.replace(&format!("{}/", folder.display()), "");
+        let golden = folder.join(format!("{name}.txt"));
+        if bless {
+            fs::write(&golden, &said).unwrap();
+        } else if fs::read_to_string(&golden).unwrap_or_default() != said {
+            wrong.push(format!("{name}: now it says\n{said}"));
+        }
+    }
+    assert!(wrong.is_empty(), "{}", wrong.join("\n"));
+}
+
+#[test]
+fn a_change_on_the_command_line_is_shown_where_it_was_typed() {
+    let sets = ["agent.wall.keep=far".to_owned(), "agent.sonra.deadline=1ms".to_owned()];
+    let mistakes = file::load("exploration", &sets, &registry()).unwrap_err();
+    let wanted = "\
+error: there is no agent \"sonra\"
+ --> --set:1:1
+1 | agent.sonra.deadline=1ms
+  | ^^^^^^^^^^^^^^^^^^^^
+  = help: did you mean \"sonar\"?
+";
+    let said = Failure::from(mistakes).to_text(Paint::Plain);
+    assert!(said.contains(wanted), "{said}");
+    assert!(said.contains("error: \"keep\" must be a number, not a text (\"far\")\n --> --set:1:17\n"), "{said}");
+}
+
+#[test]
+fn a_file_that_is_not_there_is_said_with_what_there_is() {
+    let mistakes = file::load("exploraton", &[], &registry()).unwrap_err();
+    let said = Failure::from(mistakes).to_text(Paint::Plain);
+    let wanted = "error: there is no system file or scenario \"exploraton\"\n = help: did you mean \"exploration\"? built in are: ";
+    assert!(said.starts_with(wanted), "{said}");
+}
