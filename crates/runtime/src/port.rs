@@ -226,6 +226,8 @@ pub enum OutputFault {
     Garbage = 4,
     /// Numbers that are wrong but look right.
     Wrong = 5,
+    /// Messages come some messages later.
+    Delayed = 6,
 }
 
 /// A message on its way.

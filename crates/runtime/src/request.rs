@@ -81,6 +81,8 @@ pub enum FaultKind {
     Wrong,
     /// Does a quarter of its steps.
     Slow,
+    /// Sends each message some messages later.
+    Delayed,
     /// Sends every other message, by chance.
     Intermittent,
     /// Panics in its next step.
@@ -91,13 +93,14 @@ pub enum FaultKind {
 
 impl FaultKind {
     /// All kinds.
-    pub const ALL: [FaultKind; 9] = [
+    pub const ALL: [FaultKind; 10] = [
         FaultKind::Ok,
         FaultKind::Off,
         FaultKind::Stuck,
         FaultKind::Garbage,
         FaultKind::Wrong,
         FaultKind::Slow,
+        FaultKind::Delayed,
         FaultKind::Intermittent,
         FaultKind::Panic,
         FaultKind::Hang,
@@ -112,6 +115,7 @@ impl FaultKind {
             FaultKind::Garbage => "garbage",
             FaultKind::Wrong => "wrong",
             FaultKind::Slow => "slow",
+            FaultKind::Delayed => "delayed",
             FaultKind::Intermittent => "intermittent",
             FaultKind::Panic => "panic",
             FaultKind::Hang => "hang",
@@ -143,6 +147,7 @@ impl FaultKind {
             FaultKind::Stuck => Some(OutputFault::Stuck),
             FaultKind::Garbage => Some(OutputFault::Garbage),
             FaultKind::Wrong => Some(OutputFault::Wrong),
+            FaultKind::Delayed => Some(OutputFault::Delayed),
             FaultKind::Intermittent => Some(OutputFault::Intermittent),
             _ => None,
         }

@@ -156,15 +156,16 @@ impl Router {
     }
 
     /// Ends listening.
-    pub(crate) fn untap(&mut self, port: &str) {
-        let Ok(end) = self.output(port) else { return };
+    pub(crate) fn untap(&mut self, tap: &Tap) {
         let mut topics = self.log_shared.topics();
-        let Some(number) = topics.outputs.iter().position(|(known, _)| known == port) else { return };
-        if let Some(at) = topics.taps.iter().position(|(tapped, _)| *tapped == number as u32) {
-            topics.taps.remove(at);
-        }
-        if !topics.taps.iter().any(|(tapped, _)| *tapped == number as u32) {
-            end.set_log(number as u32, topics.every[number]);
+        let Some(at) = topics.taps.iter().position(|(_, known)| known.is(tap)) else { return };
+        let (number, _) = topics.taps.remove(at);
+        let others = topics.taps.iter().any(|(tapped, _)| *tapped == number);
+        let every = topics.every.get(number as usize).copied().unwrap_or(0);
+        drop(topics);
+        // Without the agent there is no output any more that could be told.
+        if !others && let Ok(end) = self.output(tap.name()) {
+            end.set_log(number, every);
         }
     }
 

@@ -304,7 +304,7 @@ impl Player {
             Ask::View(answer) => drop(answer.send(self.router.view(self.now))),
             Ask::Plan(answer) => drop(answer.send(self.router.to_plan())),
             Ask::Tap(port, answer) => drop(answer.send(self.router.tap(&port))),
-            Ask::Untap(port) => self.router.untap(&port),
+            Ask::Untap(tap) => self.router.untap(&tap),
         }
         None
     }

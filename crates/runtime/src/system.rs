@@ -21,7 +21,7 @@ pub(crate) enum Ask {
     View(SyncSender<SystemView>),
     Plan(SyncSender<(Vec<AgentPlan>, Vec<WirePlan>)>),
     Tap(String, SyncSender<Result<Tap, Refusal>>),
-    Untap(String),
+    Untap(Tap),
 }
 
 /// A way to ask a running system, for any ordinary thread.
@@ -64,7 +64,7 @@ impl Control {
     /// Ends listening.
     pub fn untap(&self, tap: &Tap) {
         // A system that has ended has no taps.
-        let _ = self.asks.send(Ask::Untap(tap.name().to_owned()));
+        let _ = self.asks.send(Ask::Untap(tap.clone()));
     }
 }
 

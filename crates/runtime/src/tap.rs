@@ -51,6 +51,11 @@ impl Tap {
         (bag.heard.drain(..).collect(), core::mem::take(&mut bag.lost))
     }
 
+    /// Whether both are the same listener.
+    pub(crate) fn is(&self, other: &Tap) -> bool {
+        Arc::ptr_eq(&self.bag, &other.bag)
+    }
+
     pub(crate) fn give(&self, heard: Heard) {
         let mut bag = self.bag.lock().unwrap_or_else(std::sync::PoisonError::into_inner);
         if bag.heard.len() == WAITING {

@@ -375,7 +375,7 @@ impl Runner {
             Ask::View(answer) => drop(answer.send(self.router.view(now))),
             Ask::Plan(answer) => drop(answer.send(self.router.to_plan())),
             Ask::Tap(port, answer) => drop(answer.send(self.router.tap(&port))),
-            Ask::Untap(port) => self.router.untap(&port),
+            Ask::Untap(tap) => self.router.untap(&tap),
         }
         None
     }

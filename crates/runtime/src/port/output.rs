@@ -5,6 +5,7 @@
 use core::sync::atomic::{AtomicU64, Ordering};
 use std::any::Any;
 use std::cell::UnsafeCell;
+use std::collections::VecDeque;
 use std::sync::Arc;
 
 use types::cdr::NoElement;
@@ -44,7 +45,9 @@ struct OutputInner<T: Message> {
     sequence: u64,
     routes: Vec<Route<T>>,
     memory: Option<memory::Writer<T>>,
-    stuck: Option<(T, Vec<T::Element>)>,
+    /// What a fault keeps of the messages before: the first one, or those that are late.
+    kept: VecDeque<(T, Vec<T::Element>, Time)>,
+    kept_for: u64,
 }
 
 /// The routes behind an output.
@@ -158,7 +161,9 @@ impl<T: Message> OutputEnd for OutputCore<T> {
     }
 
     fn set_fault(&self, fault: OutputFault) {
-        self.fault.store(fault as u64, Ordering::Relaxed);
+        // Each request has a number of its own, so that what the fault before it kept is known to be old.
+        let before = self.fault.load(Ordering::Relaxed) >> 8;
+        self.fault.store((before + 1) << 8 | fault as u64, Ordering::Relaxed);
     }
 
     fn prepare_message(&self, bytes: &[u8]) -> Result<Box<dyn Any + Send>, types::cdr::Error> {
@@ -205,6 +210,9 @@ impl Default for Envelope {
         }
     }
 }
+
+/// How many messages late those of an output come that was made to delay them.
+const MESSAGES_LATE: usize = 3;
 
 /// What became of a message, wire by wire.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -329,7 +337,7 @@ impl<T: Message> OutputCore<T> {
         };
         inner.sequence += 1;
         self.sent.store(inner.sequence, Ordering::Relaxed);
-        if self.fault.load(Ordering::Relaxed) != OutputFault::None as u64 {
+        if self.fault.load(Ordering::Relaxed) & 0xff != OutputFault::None as u64 {
             return self.send_faulty(inner, &header, fill);
         }
         match &mut inner.memory {
@@ -417,7 +425,12 @@ impl<T: Message> OutputCore<T> {
         header: &Header,
         fill: impl FnOnce(&mut T, &mut [T::Element]) -> usize,
     ) -> Sent {
-        let fault = self.fault.load(Ordering::Relaxed);
+        let word = self.fault.load(Ordering::Relaxed);
+        if word != inner.kept_for {
+            inner.kept.clear();
+            inner.kept_for = word;
+        }
+        let fault = word & 0xff;
         // A pure function of the message's number: the same run misbehaves in the same way.
         let draws = Stream::new(0, "output fault").sample(inner.sender.0.into()).sample(header.sequence);
         if fault == OutputFault::Off as u64
@@ -430,9 +443,21 @@ impl<T: Message> OutputCore<T> {
         let mut row = vec![T::Element::default(); rows];
         let len = fill(&mut head, &mut row).min(rows);
         row.truncate(len);
+        let mut header = *header;
         if fault == OutputFault::Stuck as u64 {
-            let (stuck_head, stuck_row) = inner.stuck.get_or_insert((head, row));
-            (head, row) = (*stuck_head, stuck_row.clone());
+            if inner.kept.is_empty() {
+                inner.kept.push_back((head, row.clone(), header.stamp));
+            }
+            if let Some((first, first_row, _)) = inner.kept.front() {
+                (head, row) = (*first, first_row.clone());
+            }
+        } else if fault == OutputFault::Delayed as u64 {
+            inner.kept.push_back((head, row, header.stamp));
+            if inner.kept.len() <= MESSAGES_LATE {
+                return Sent::default();
+            }
+            let Some((old, old_row, stamp)) = inner.kept.pop_front() else { return Sent::default() };
+            (head, row, header.stamp) = (old, old_row, stamp);
         } else if fault == OutputFault::Garbage as u64 || fault == OutputFault::Wrong as u64 {
             let wild = fault == OutputFault::Garbage as u64;
             let mut number = 0;
@@ -448,9 +473,9 @@ impl<T: Message> OutputCore<T> {
             len
         };
         if inner.memory.is_some() {
-            self.send_link(inner, header, put)
+            self.send_link(inner, &header, put)
         } else {
-            self.send_value(inner, header, put)
+            self.send_value(inner, &header, put)
         }
     }
 }
@@ -536,7 +561,8 @@ pub(crate) fn output_core<T: Message>(options: &PortOptions, seats: usize) -> Ar
             sequence: 0,
             routes: Vec::new(),
             memory,
-            stuck: None,
+            kept: VecDeque::new(),
+            kept_for: 0,
         }),
         log_number: AtomicU64::new(u64::from(u32::MAX)),
         log_every: AtomicU64::new(0),

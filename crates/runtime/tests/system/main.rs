@@ -193,6 +193,28 @@ fn an_agent_that_dies_again_and_again_is_left_dead() {
 }
 
 #[test]
+fn an_output_misbehaves_as_it_is_asked_to() {
+    let mut plan = chain("faults");
+    let faults = ["stuck", "ok", "delayed", "ok", "off", "ok"];
+    plan.requests = faults
+        .iter()
+        .enumerate()
+        .map(|(i, kind)| at(95 + 100 * i as i64, &format!("fault source.out {kind}")))
+        .collect();
+    Simulation::new(&plan, &types(), options(700)).unwrap().run().unwrap();
+    let heard: Vec<(i64, i64)> =
+        heard("faults").iter().map(|(t, twist)| (t.0 / 1_000_000, twist.linear as i64)).collect();
+    let at = |from: i64, to: i64| {
+        heard.iter().filter(|(t, _)| (from..to).contains(t)).map(|(_, n)| *n).collect::<Vec<_>>()
+    };
+    assert_eq!(at(100, 195), [11; 10], "stuck at the first value of the fault");
+    assert_eq!(at(200, 295), (21..=30).collect::<Vec<_>>(), "well again");
+    assert_eq!(at(300, 395), (31..=37).collect::<Vec<_>>(), "three messages late");
+    assert_eq!(at(500, 595), [], "off");
+    assert_eq!(at(600, 695), (61..=70).collect::<Vec<_>>());
+}
+
+#[test]
 fn wiring_changes_while_the_rest_runs() {
     let mut plan = chain("wiring");
     plan.requests = vec![
