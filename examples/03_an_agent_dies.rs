@@ -49,7 +49,12 @@ fn main() -> Result<(), sinew::runtime::CannotRun> {
     let report = Simulation::new(&plan, &registry![Count, Superstitious], options)?.run()?;
     for incident in &report.incidents {
         // What was said, without the place in the source.
-        println!("{} {}: {}", incident.time, incident.agent, incident.what.split(" (").next().unwrap_or_default());
+        println!(
+            "{} {}: {}",
+            incident.time,
+            incident.agent,
+            incident.what.split(" (").next().unwrap_or_default()
+        );
     }
     Ok(())
 }

@@ -28,7 +28,6 @@ pub mod head;
 pub mod image_tracker;
 pub mod laser;
 pub mod odometry;
-mod recall;
 pub mod safety_monitor;
 mod shared;
 pub mod sonar;

@@ -4,14 +4,14 @@
 
 use motion::ring::Ring;
 use motion::safety::{Parameters, Verdict, judge};
+use perception::local_map::{LocalMap, MapParams};
 use runtime::{Agent, Fault, Input, Output, Step};
 use types::geometry::PI;
 use types::messages::{Drive, Odometry, Offer, Ranges, Safety, Twist};
 use types::params::Params;
 use types::{Duration, Pose, Time};
 
-use crate::recall::{POINTS_AROUND, Recall, Sensors};
-use crate::shared::{Dated, ring};
+use crate::shared::{Dated, echoes, ring};
 
 /// What the robot is, and how careful it shall be.
 #[derive(Clone, Debug, Params)]
@@ -58,7 +58,7 @@ pub struct SafetyParams {
     /// Highest speed while it turns away (m/s). 0.2 keeps the curve short.
     #[param(default = 0.2, min = 0.0, max = 10.0)]
     pub avoid_speed: f64,
-    /// Distance from the rim at which it only creeps, and steers away from what is beside it (m). 0.17: a sonar tells 0.15 m of all that is nearer.
+    /// Distance from the rim to what is beside it, at which it only creeps (m). 0.17: a sonar tells 0.15 m of all that is nearer.
     #[param(default = 0.17, min = 0.0, max = 2.0)]
     pub touch: f64,
     /// Highest speed with something that close beside it (m/s). 0.1 is 2.5 cm between two readings at 4 Hz.
@@ -76,7 +76,8 @@ impl SafetyParams {
     fn law(&self) -> Parameters {
         Parameters {
             radius: self.radius,
-            cone: self.cone,
+            // Where in its cone an echo came from is what the map is for.
+            cone: 0.0,
             side_margin: self.side_margin,
             margin: self.margin,
             stop: self.stop_distance,
@@ -140,11 +141,16 @@ impl Agent for SafetyMonitor {
     }
 }
 
-/// What is farther from straight ahead than this is passed, not driven at (rad): 80°.
-const PASSING: f64 = 1.4;
+/// The most occupied cells that are looked at.
+const POINTS: usize = 2048;
+
+/// What is farther from straight ahead than this is left behind (rad): 110°.
+const BESIDE: f64 = 0.6 * PI;
+/// A turn at this rate is one (rad/s), not the noise of a controller.
+const TURNING: f64 = 0.2;
 
 /// What was heard last, and the side on which the robot turns away.
-#[derive(Clone, Copy, Debug, Default)]
+#[derive(Debug, Default)]
 struct Watch {
     filtered: Option<Dated<Ranges>>,
     raw: Option<Dated<Ranges>>,
@@ -152,9 +158,9 @@ struct Watch {
     /// Where the robot is, and where it was when the ranges were measured.
     pose: Option<Pose>,
     heard_at: Option<Pose>,
-    recall: Recall,
-    /// The stamp of the ranges that were taken over last.
-    recalled: Option<Time>,
+    map: LocalMap,
+    /// The stamp of the ranges that were put into the map last.
+    mapped: Option<Time>,
     /// 1 for left, −1 for right; 0 while nothing is to be avoided.
     side: f64,
     /// Whether that was said already.
@@ -179,6 +185,7 @@ impl Watch {
             }
         }
         self.touch(params, &mut verdict);
+        let offer = self.avoid(params, &mut verdict, now);
         let nothing_heard =
             [ring(&raw), ring(&filtered)].iter().all(|ring: &Ring<'_>| ring.echoes().next().is_none());
         let safety = Safety {
@@ -190,49 +197,53 @@ impl Watch {
             narrow: verdict.narrow,
             blind: nothing_heard,
         };
-        (safety, self.avoid(params, &verdict, now))
+        (safety, offer)
     }
 
-    /// What it remembers counts as well as what it hears, but as points: where they lie is known better than a cone tells.
+    /// What it remembers counts as well as what it hears: there it is known where in its cone an echo came from.
     fn remembered(&mut self, params: &SafetyParams, filtered: &Ranges, stamp: Time) -> Option<Verdict> {
         let pose = self.pose?;
-        let sensors = Sensors {
-            rim: params.radius,
-            cone: params.cone,
-            reach: params.radius + params.horizon,
-            keep: params.remember,
-        };
-        if self.recalled != Some(stamp) {
-            self.recall.update(&sensors, filtered, self.heard_at.unwrap_or(pose), stamp);
-            self.recalled = Some(stamp);
+        if self.mapped != Some(stamp) {
+            self.map.set_params(MapParams {
+                rim: params.radius,
+                cone: params.cone,
+                keep: params.remember,
+                ..MapParams::default()
+            });
+            self.map.update(echoes(filtered), self.heard_at.unwrap_or(pose), stamp);
+            self.mapped = Some(stamp);
         }
-        let mut room = [(0.0, 0.0); POINTS_AROUND];
-        let points = Ring::Beams(self.recall.around(pose, &mut room));
-        let law = Parameters { cone: 0.0, ..params.law() };
-        (!points.is_empty()).then(|| judge(&law, points, points, self.motion))
+        let mut room = [(0.0, 0.0); POINTS];
+        let mut len = 0;
+        let points = self.map.around(pose, params.radius + params.horizon, stamp);
+        for (out, point) in room.iter_mut().zip(points) {
+            *out = (point.bearing(), point.norm());
+            len += 1;
+        }
+        let points = Ring::Beams(&room[..len]);
+        (len > 0).then(|| judge(&params.law(), points, points, self.motion))
     }
 
-    /// With something at its side as near as can be told it creeps, and only past it or away from it, not on towards it.
-    fn touch(&mut self, params: &SafetyParams, verdict: &mut Verdict) {
-        if verdict.nearest > params.touch || verdict.nearest_bearing.abs() > 0.6 * PI {
-            return;
+    /// With something beside it as near as can be told it creeps.
+    fn touch(&self, params: &SafetyParams, verdict: &mut Verdict) {
+        if verdict.nearest <= params.touch && verdict.nearest_bearing.abs() <= BESIDE {
+            verdict.linear_max = verdict.linear_max.min(params.creep);
         }
-        self.side = if verdict.nearest_bearing > 0.0 { -1.0 } else { 1.0 };
-        verdict.wider = self.side;
-        verdict.forward &= verdict.nearest_bearing.abs() > PASSING;
-        verdict.linear_max = if verdict.forward { verdict.linear_max.min(params.creep) } else { 0.0 };
-        verdict.danger = 1.0;
     }
 
-    /// Away from what is near. The side is chosen once for each danger: to choose anew at every reading is to dither before a pillar.
-    fn avoid(&mut self, params: &SafetyParams, verdict: &Verdict, now: Time) -> Option<Offer> {
+    /// Away from what is near. It goes on to the side to which it turns already, else to the wider one, and keeps to that for as long as
+    /// the danger lasts: to choose anew at every reading is to dither before a pillar.
+    fn avoid(&mut self, params: &SafetyParams, verdict: &mut Verdict, now: Time) -> Option<Offer> {
         if verdict.danger < params.avoid_from {
             self.side = 0.0;
             return None;
         }
-        if self.side == 0.0 {
+        if self.motion.angular.abs() > TURNING {
+            self.side = self.motion.angular.signum();
+        } else if self.side == 0.0 {
             self.side = if verdict.wider < 0.0 { -1.0 } else { 1.0 };
         }
+        verdict.wider = self.side;
         // With room ahead it is no wall but a neighbour: the nearer it is in front, the harder the turn.
         let turn = if verdict.forward { params.avoid_turn * verdict.danger } else { params.avoid_turn };
         Some(Offer {
@@ -313,17 +324,25 @@ mod tests {
     }
 
     #[test]
-    fn with_something_close_beside_it_it_creeps_past_but_not_towards_it() {
+    fn with_something_close_beside_it_it_creeps_past() {
         let params = SafetyParams::default();
-        let beside = |direction: usize| {
+        let beside = |range| {
             let mut ranges = around(4.0, 4.0, 4.0);
-            ranges.values[direction] = 0.375;
-            let (safety, offer) = watch(ranges).judge(&params, Time::ZERO);
-            (safety.linear_max, offer.unwrap().twist.angular)
+            ranges.values[3] = range;
+            watch(ranges).judge(&params, Time::ZERO).0.linear_max
         };
-        assert_eq!(beside(3), (0.1, -0.7), "straight to the left");
-        assert_eq!(beside(2), (0.0, -0.7), "ahead of that");
-        assert_eq!(beside(10), (0.0, 0.7), "on the right");
+        assert_eq!((beside(0.375), beside(0.45)), (0.1, 0.6));
+    }
+
+    #[test]
+    fn it_goes_on_turning_to_the_side_to_which_it_turns_already() {
+        let side = |angular| {
+            let mut watch = watch(around(0.4, 3.0, 0.6));
+            watch.motion = Twist::new(0.0, angular);
+            let (safety, offer) = watch.judge(&SafetyParams::default(), Time::ZERO);
+            (safety.wider, offer.unwrap().twist.angular)
+        };
+        assert_eq!((side(-0.3), side(0.1)), ((-1.0, -0.7), (1.0, 0.7)));
     }
 
     #[test]

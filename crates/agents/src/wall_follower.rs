@@ -1,16 +1,17 @@
-//! The wall follower: along the walls, and away from what it only circles.
+//! The wall follower: along the walls, through every gap that is wide enough, and away from what it only circles.
 
 use libm::sin;
-use motion::island::Follower;
 use motion::odometry::Increment;
-use motion::wall::{Parameters, Side};
+use motion::roam::{Parameters, Roamer};
+use motion::wall::Side;
+use perception::local_map::{LocalMap, MapParams};
 use runtime::{Agent, Fault, Input, Output, Step};
 use types::geometry::{PI, wrap};
 use types::messages::{Drive, Odometry, Offer, Ranges};
 use types::params::Params;
 use types::{Duration, Pose, Text, Time};
 
-use crate::shared::ring;
+use crate::shared::echoes;
 
 /// How the wall is followed.
 #[derive(Clone, Debug, Params)]
@@ -24,24 +25,27 @@ pub struct WallParams {
     /// Half the opening angle of one beam (rad). PI / 12 is 15°, that of a common ultrasonic transducer; 0 for a laser.
     #[param(default = PI / 12.0, min = 0.0, max = 1.6)]
     pub cone: f64,
-    /// Distance to keep from the wall to the robot's centre (m). 0.45 is the middle of a door of 0.9 m.
-    #[param(default = 0.45, min = 0.05, max = 5.0)]
+    /// Distance to keep from its middle to everything where there is room (m). 0.42 leaves what a sonar can tell apart beside the body, and fits into a door of 0.9 m.
+    #[param(default = 0.42, min = 0.05, max = 5.0)]
     pub keep: f64,
-    /// A thing on the side counts as a wall up to this distance (m). 1.35 is three times what is kept: the other side of a corridor is farther.
-    #[param(default = 1.35, min = 0.1, max = 20.0)]
-    pub reach: f64,
-    /// Speed with all free (m/s). 0.4 lets an error of direction fall to 1/e within the distance that is kept, also at four readings a second.
+    /// Distance from its middle with which it still goes through (m). 0.27 leaves twice the error of a sonar beside the body.
+    #[param(default = 0.27, min = 0.05, max = 5.0)]
+    pub least: f64,
+    /// Way that must be free ahead (m). 0.65 is more than the body is long; a niche that is not deeper is taken for wall.
+    #[param(default = 0.65, min = 0.05, max = 3.0)]
+    pub look: f64,
+    /// Speed with all free (m/s). 0.4 lets an error of direction fall to 1/e within half of the distance that is kept.
     #[param(default = 0.4, min = 0.0, max = 5.0)]
     pub speed: f64,
-    /// How fast the wished speed grows while all is free (m/s²). 0.2 takes two seconds to full speed.
-    #[param(default = 0.2, min = 0.0, max = 5.0)]
+    /// How fast the wished speed grows while all is free (m/s²). 0.3 takes a second and a half to full speed.
+    #[param(default = 0.3, min = 0.0, max = 5.0)]
     pub growth: f64,
-    /// Free way ahead, from the rim, below which it begins to turn away (m). 0.65 is before the safety monitor forbids to go on.
-    #[param(default = 0.65, min = 0.05, max = 10.0)]
-    pub front_far: f64,
-    /// Free way ahead at which it turns in place (m). 0.3 is still clear of where the safety monitor forbids to go on.
-    #[param(default = 0.3, min = 0.0, max = 10.0)]
-    pub front_near: f64,
+    /// How long what was near is remembered while no sensor hears it (time). 30 s is how long a robot may turn about in a corner; on so short a way the odometry drifts by centimetres.
+    #[param(default = Duration::secs(30), min = 0.0, max = 600.0)]
+    pub remember: Duration,
+    /// It leaves what it follows when it has not got away from one place for this long (s). 15 is time to turn around twice.
+    #[param(default = 15.0, min = 1.0, max = 600.0)]
+    pub patience: f64,
     /// How long a wish of it holds (time). 600 ms is two missed readings of a sonar at 4 Hz.
     #[param(default = Duration::millis(600), min = 0.01, max = 60.0)]
     pub hold: Duration,
@@ -52,22 +56,31 @@ impl WallParams {
         Parameters {
             side: if self.side.as_str() == "right" { Side::Right } else { Side::Left },
             keep: self.keep,
-            reach: self.reach,
+            least: self.least,
+            look: self.look,
             speed: self.speed,
             growth: self.growth,
-            front_far: self.front_far,
-            front_near: self.front_near,
-            ..Parameters::new(self.radius, self.cone)
+            patience: self.patience,
+            ..Parameters::new(self.radius)
         }
+    }
+
+    fn map(&self) -> MapParams {
+        MapParams { rim: self.radius, cone: self.cone, keep: self.remember, ..MapParams::default() }
+    }
+
+    /// How far the ways are looked at (m).
+    fn reach(&self) -> f64 {
+        3.0 * self.look
     }
 }
 
-/// Keeps a distance to the wall at its side and goes the faster the freer the way is; leaves an island that it has circled.
+/// Keeps to the wall at its side and goes the faster the freer the way is; leaves an island that it has circled.
 #[derive(Agent)]
 pub struct WallFollower {
     /// What is around.
     ranges: Input<Ranges>,
-    /// Where the robot believes to be; without it no circle is noticed.
+    /// Where the robot believes to be; without it nothing is remembered.
     odometry: Input<Odometry>,
     /// A wish to drive along the wall.
     drive: Output<Offer>,
@@ -83,56 +96,65 @@ impl Agent for WallFollower {
         }
     }
 
-    fn step(&mut self, _: &mut Step) -> Result<(), Fault> {
+    fn step(&mut self, step: &mut Step) -> Result<(), Fault> {
         if let Some(odometry) = self.odometry.latest() {
-            self.walk.now_at = Some(odometry.pose);
+            self.walk.pose = Some(odometry.pose);
         }
-        let Some(received) = self.ranges.newest() else { return Ok(()) };
-        let stamp = received.header().stamp;
-        let at = self.odometry.at(stamp).map(|found| found.value().pose);
-        let offer = self.walk.advance(&self.params, &received, at, stamp);
-        self.drive.send(offer);
+        if let Some(received) = self.ranges.newest() {
+            let stamp = received.header().stamp;
+            let at = self.odometry.at(stamp).map(|found| found.value().pose);
+            self.walk.hear(&self.params, &received, at, stamp);
+        }
+        if let Some(offer) = self.walk.advance(&self.params, step.now) {
+            self.drive.send(offer);
+        }
         Ok(())
     }
 }
 
-/// The follower and where it was at the reading before.
-#[derive(Clone, Copy, Debug, Default)]
+/// The roamer, what it remembers, and where it was at the step before.
+#[derive(Debug, Default)]
 struct Walk {
-    follower: Option<Follower>,
-    last: Option<(Option<Pose>, Time)>,
-    now_at: Option<Pose>,
+    map: LocalMap,
+    roamer: Option<Roamer>,
+    pose: Option<Pose>,
+    heard: Option<Time>,
+    last: Option<(Pose, Time)>,
 }
 
 impl Walk {
-    /// `at` is where the robot was when the ranges were measured; without it the last pose that was heard counts.
-    fn advance(&mut self, params: &WallParams, ranges: &Ranges, at: Option<Pose>, stamp: Time) -> Offer {
-        let here = at.or(self.now_at);
-        let (moved, dt) = match self.last.replace((here, stamp)) {
-            Some((before, then)) => (moved(before, here), (stamp - then).seconds()),
-            None => (Increment::default(), 0.0),
-        };
+    /// Takes over ranges that were measured at `at`; without it the last pose that was heard counts.
+    fn hear(&mut self, params: &WallParams, ranges: &Ranges, at: Option<Pose>, stamp: Time) {
+        if self.pose.is_none() {
+            // Without odometry what was heard before may be anywhere.
+            self.map.reset();
+        }
+        self.map.set_params(params.map());
+        self.map.update(echoes(ranges), at.or(self.pose).unwrap_or_default(), stamp);
+        self.heard = Some(stamp);
+    }
+
+    /// A wish as long as the ranges are not too old.
+    fn advance(&mut self, params: &WallParams, now: Time) -> Option<Offer> {
+        let heard = self.heard.filter(|heard| now - *heard <= params.hold)?;
+        let here = self.pose.unwrap_or_default();
+        let (before, then) = self.last.replace((here, now)).unwrap_or((here, now));
         let law = params.law();
-        let follower = self.follower.get_or_insert_with(|| Follower::new(law));
-        follower.set_parameters(law);
-        let left = follower.islands_left();
-        let twist = follower.step(ring(ranges), moved, dt);
-        if follower.islands_left() > left {
-            runtime::note!("leaves an island after circling it; islands so far: {}", follower.islands_left());
+        let roamer = self.roamer.get_or_insert_with(|| Roamer::new(law));
+        roamer.set_parameters(law);
+        let left = roamer.times_left();
+        let points = self.map.around(here, params.reach(), now);
+        let twist = roamer.step(points, moved(before, here), (now - then).seconds());
+        if roamer.times_left() > left {
+            runtime::note!("leaves what it followed; times so far: {}", roamer.times_left());
         }
-        Offer {
-            twist,
-            weight: 1.0,
-            valid_until: stamp + params.hold,
-            form: Drive::Numeric,
-            ..Offer::default()
-        }
+        let valid_until = heard + params.hold;
+        Some(Offer { twist, weight: 1.0, valid_until, form: Drive::Numeric, ..Offer::default() })
     }
 }
 
 /// The motion between two poses, as if along an arc.
-fn moved(before: Option<Pose>, now: Option<Pose>) -> Increment {
-    let (Some(before), Some(now)) = (before, now) else { return Increment::default() };
+fn moved(before: Pose, now: Pose) -> Increment {
     let there = before.inverse().transform(now.position());
     let turn = wrap(now.heading - before.heading);
     let half = turn / 2.0;
@@ -151,35 +173,43 @@ mod tests {
     fn the_motion_between_two_poses_is_the_arc_between_them() {
         let start = Pose::new(1.0, -2.0, 2.9);
         for (distance, turn) in [(0.1, 0.5), (-0.1, 0.3), (0.2, -0.4), (0.15, 0.0), (0.0, 1.0)] {
-            let got = moved(Some(start), Some(start.along_arc(distance, turn)));
+            let got = moved(start, start.along_arc(distance, turn));
             assert!((got.distance - distance).abs() < 1e-9 && (got.turn - turn).abs() < 1e-9, "{got:?}");
         }
-        assert_eq!(moved(None, Some(start)), Increment::default());
     }
 
     #[test]
-    fn the_side_and_the_speed_of_the_parameters_count_at_once() {
-        // A wall on both sides at half of what is kept too much: towards the chosen one.
+    fn before_a_wall_it_turns_so_that_the_wall_is_on_the_chosen_side() {
         let mut ranges = blank(12, 0.3, 6.2);
         ranges.values.fill(6.2);
-        let near = |from: usize| {
-            [0.8 / 0.866, 0.8, 0.8 / 0.866].into_iter().enumerate().map(move |(i, r)| (from + i, r as f32))
-        };
-        near(2).chain(near(8)).for_each(|(i, r)| ranges.values[i] = r);
+        for (i, range) in [(11, 0.5), (0, 0.45), (1, 0.5)] {
+            ranges.values[i] = range;
+        }
         let turn = |side: &str| {
             let params = WallParams { side: side.into(), ..WallParams::default() };
-            Walk::default().advance(&params, &ranges, None, Time::ZERO).twist.angular
+            let mut walk = Walk { pose: Some(Pose::default()), ..Walk::default() };
+            walk.hear(&params, &ranges, None, Time::ZERO);
+            walk.advance(&params, Time::ZERO).unwrap().twist.angular
         };
-        assert!(turn("left") > 0.05 && turn("right") < -0.05, "{} {}", turn("left"), turn("right"));
-        let mut walk = Walk::default();
+        assert!(turn("left") < -0.3 && turn("right") > 0.3, "{} {}", turn("left"), turn("right"));
+    }
+
+    #[test]
+    fn the_speed_grows_to_that_of_the_parameters_and_old_ranges_are_none() {
+        let mut walk = Walk { pose: Some(Pose::default()), ..Walk::default() };
         let mut params = WallParams::default();
         let mut speed = 0.0;
+        let mut ranges = blank(12, 0.3, 6.2);
+        ranges.values.fill(6.2);
         for i in 0..40 {
             params.speed = if i < 20 { 0.4 } else { 0.1 };
             let stamp = Time::ZERO + Duration::millis(250 * i);
-            speed = walk.advance(&params, &ranges, None, stamp).twist.linear;
-            assert!(i != 19 || speed > 0.15, "{speed}");
+            walk.hear(&params, &ranges, None, stamp);
+            speed = walk.advance(&params, stamp).unwrap().twist.linear;
+            assert!(i != 19 || speed > 0.3, "{speed}");
         }
         assert!(speed <= 0.1);
+        let late = Time::ZERO + Duration::millis(250 * 39) + params.hold + Duration::nanos(1);
+        assert!(walk.advance(&params, late).is_none());
     }
 }

@@ -16,6 +16,8 @@
 //! | [`safety`] | how fast is still safe, and where there is room |
 //! | [`wall`] | steering along a wall |
 //! | [`island`] | a wall follower that leaves islands |
+//! | [`boundary`] | which ways a body fits through, and which of them is along the wall |
+//! | [`roam`] | along the walls of an unknown place, leaving what was circled |
 //! | [`pursuit`] | following what a camera on a turning head sees |
 #![no_std]
 #![forbid(unsafe_code)]
@@ -23,6 +25,7 @@
 #[cfg(test)]
 extern crate std;
 
+pub mod boundary;
 pub mod fusion;
 pub mod fuzzy;
 pub mod island;
@@ -32,6 +35,7 @@ pub mod motor;
 pub mod odometry;
 pub mod pursuit;
 pub mod ring;
+pub mod roam;
 pub mod safety;
 pub mod wall;
 pub mod word;

@@ -10,7 +10,7 @@ use runtime::Registry;
 use types::Duration;
 
 use crate::error::Failure;
-use crate::{run, terminal, tools};
+use crate::{bench, live, log, run, terminal, tools};
 
 /// Many agents, one robot, in time: runs systems of agents on robots, in simulation and on recorded data.
 ///
@@ -29,8 +29,22 @@ struct Line {
 enum Command {
     /// Runs a system until its goal is met, the time is over, or Ctrl-C.
     Run(Box<RunArgs>),
+    #[command(flatten)]
+    Live(live::LiveCommand),
     /// Finds all mistakes of a system file without running it.
     Check(tools::CheckArgs),
+    /// Prints the JSON schema of system files, for editors.
+    Schema,
+    /// Looks into logs, draws them, plays them, mends them.
+    #[command(subcommand)]
+    Log(log::LogCommand),
+    /// Writes a template that builds, runs and has a test.
+    #[command(subcommand)]
+    New(tools::NewCommand),
+    /// Says whether this machine can do real time, what is missing, and how to mend it.
+    Doctor,
+    /// Measures; "sinew bench list" says what.
+    Bench(bench::BenchArgs),
 }
 
 /// What `sinew run` can be told.
@@ -186,7 +200,13 @@ pub fn program(registry: Registry) -> ExitCode {
 fn done(command: Command, registry: Registry, json: bool) -> Result<ExitCode, Failure> {
     match command {
         Command::Run(args) => run::run(&args, registry, json),
+        Command::Live(command) => live::live(command, json),
         Command::Check(args) => tools::check(&args, &registry, json),
+        Command::Schema => Ok(tools::print_schema(&registry)),
+        Command::Log(command) => log::log(command, json),
+        Command::New(command) => tools::make(&command, json),
+        Command::Doctor => Ok(tools::examine(json)),
+        Command::Bench(args) => bench::bench(&args, &registry, json),
     }
 }
 

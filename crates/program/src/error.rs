@@ -243,6 +243,9 @@ error: nothing runs
         assert_eq!(json["errors"][0]["column"], 8);
         assert_eq!(json["errors"][1]["file"], Json::Null);
         let one = Failure::new("no").help("yes").to_json();
-        assert_eq!(one, json!({"error": {"what": "no", "file": null, "line": null, "column": null, "help": "yes"}}));
+        assert_eq!(
+            one,
+            json!({"error": {"what": "no", "file": null, "line": null, "column": null, "help": "yes"}})
+        );
     }
 }

@@ -29,7 +29,9 @@ pub(crate) fn of_log(log: &Path, folder: &Path, timing: Option<Timing>) -> Resul
     while let Some(message) = reader.next_message().map_err(|error| error.to_string())? {
         trail.take(&message);
     }
-    std::fs::create_dir_all(folder).map_err(|error| format!("{} cannot be made: {error}", folder.display()))?;
+    trail.settle();
+    std::fs::create_dir_all(folder)
+        .map_err(|error| format!("{} cannot be made: {error}", folder.display()))?;
     let mut files = Files { folder, made: Vec::new() };
     let several = trail.robots.len() > 1;
     for (name, seen) in &trail.robots {
@@ -40,7 +42,7 @@ pub(crate) fn of_log(log: &Path, folder: &Path, timing: Option<Timing>) -> Resul
         if !seen.speed.is_empty() || !seen.commanded.is_empty() {
             files.write(&file("velocity"), &velocity(&trail, seen).draw())?;
         }
-        if !seen.log_way.is_empty() && !seen.scan_points.is_empty() {
+        if !seen.scan_points.is_empty() {
             files.write(&file("map"), &map(seen).draw())?;
         }
     }
@@ -51,6 +53,11 @@ pub(crate) fn of_log(log: &Path, folder: &Path, timing: Option<Timing>) -> Resul
         files.write("timing", &timing.draw())?;
     }
     Ok(files.made)
+}
+
+/// The names of the robots of a log.
+pub(crate) fn robots(notes: &Notes) -> Vec<String> {
+    scenery::robots(notes).into_iter().map(|robot| robot.name).collect()
 }
 
 struct Files<'a> {
@@ -64,7 +71,8 @@ impl Files<'_> {
         let png = picture.png(DOTS).map_err(|error| error.to_string())?;
         for (ending, bytes) in [("png", png), ("svg", picture.svg().into_bytes())] {
             let path = self.folder.join(format!("{name}.{ending}"));
-            std::fs::write(&path, bytes).map_err(|error| format!("{} cannot be written: {error}", path.display()))?;
+            std::fs::write(&path, bytes)
+                .map_err(|error| format!("{} cannot be written: {error}", path.display()))?;
             self.made.push(path);
         }
         Ok(())
@@ -72,21 +80,27 @@ impl Files<'_> {
 }
 
 fn trajectory(trail: &Trail, seen: &Seen) -> Trajectory {
-    let path: Vec<Waypoint> = seen.way.iter().map(|(time, pose)| Waypoint { time: *time, pose: *pose }).collect();
+    let path: Vec<Waypoint> =
+        seen.way.iter().map(|(time, pose)| Waypoint { time: *time, pose: *pose }).collect();
     let length = path.last().map_or(0.0, |last| last.time) - path.first().map_or(0.0, |first| first.time);
     let others = trail.people.iter().map(|(name, points)| (name.clone(), points.clone()));
     Trajectory {
         drawing: trail.drawing.clone(),
         path,
         bands: trail.bands(),
-        points: seen.points.clone(),
+        points: thinned(&seen.points.points),
         points_name: seen.points_name.to_owned(),
         radius: trail.radius(&seen.name),
-        outline_every: (length / 20.0).max(1.0),
+        outline_every: (length / 100.0).ceil() * 5.0,
         goal: None,
         events: trail.events.clone(),
         others: others.collect(),
     }
+}
+
+/// Every so many of the points, so that they show where things are and leave the rest to be seen.
+fn thinned(points: &[Point]) -> Vec<Point> {
+    points.iter().step_by(points.len().div_ceil(trail::SHOWN_POINTS).max(1)).copied().collect()
 }
 
 fn velocity(trail: &Trail, seen: &Seen) -> Velocity {
@@ -96,10 +110,17 @@ fn velocity(trail: &Trail, seen: &Seen) -> Velocity {
     };
     let both = |which| {
         let rows = [("measured", &seen.speed), ("commanded", &seen.commanded)];
-        rows.into_iter().filter(|(_, rows)| !rows.is_empty()).map(|(name, rows)| pick(name, rows, which)).collect()
+        rows.into_iter()
+            .filter(|(_, rows)| !rows.is_empty())
+            .map(|(name, rows)| pick(name, rows, which))
+            .collect()
     };
-    let heading = seen.way.iter().chain(if seen.way.is_empty() { &seen.log_way[..] } else { &[] });
-    let heading = Series { name: "measured".into(), points: heading.map(|(time, pose)| (*time, pose.heading)).collect() };
+    let heading = [&seen.way, &seen.log_way, &seen.odometry].into_iter().find(|way| !way.is_empty());
+    let heading = heading.into_iter().flatten();
+    let heading = Series {
+        name: "measured".into(),
+        points: heading.map(|(time, pose)| (*time, pose.heading)).collect(),
+    };
     Velocity {
         speed: both(1),
         angular_speed: both(2),
@@ -109,14 +130,14 @@ fn velocity(trail: &Trail, seen: &Seen) -> Velocity {
     }
 }
 
-/// The way of a recording as the log has it, and where the laser saw something from there.
+/// The ways of a recording, as the log has it and by odometry, and where the laser saw something from there.
 fn map(seen: &Seen) -> Map {
-    let points = |way: &[(f64, types::Pose)]| way.iter().map(|(_, pose)| pose.position()).collect::<Vec<Point>>();
-    let mut paths = vec![("the log's own poses".to_owned(), points(&seen.log_way))];
-    if !seen.odometry.is_empty() {
-        paths.push(("odometry".to_owned(), points(&seen.odometry)));
-    }
-    Map { points: seen.scan_points.clone(), points_name: "laser".into(), paths, ..Map::default() }
+    let points =
+        |way: &[(f64, types::Pose)]| way.iter().map(|(_, pose)| pose.position()).collect::<Vec<Point>>();
+    let ways = [("the log's own poses", &seen.log_way), ("odometry", &seen.odometry)];
+    let known = ways.into_iter().filter(|(_, way)| !way.is_empty());
+    let paths = known.map(|(name, way)| (name.to_owned(), points(way))).collect();
+    Map { points: seen.scan_points.points.clone(), points_name: "laser".into(), paths, ..Map::default() }
 }
 
 /// When each agent sent something, in the middle of the run.
@@ -152,4 +173,3 @@ pub(crate) fn timing(agents: &[AgentView], samples: &Samples) -> Timing {
 
 /// The notes of a log that figures are made from, and nothing that differs between two runs of the same seed.
 pub(crate) type Notes = BTreeMap<String, String>;
-

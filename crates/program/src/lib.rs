@@ -7,12 +7,20 @@
 //! | templates of agents and systems | [`new`] |
 //! | what a machine can do for real time | [`doctor`] |
 //! | how mistakes look, for people and programs | [`Failure`] |
+//! | the command line | [`program`], `cli` |
+//! | a run from its file to its summary, log and figures | `run`, `figures` |
+//! | asking a system that runs | `live` |
+//! | what is done with logs | `log` |
+//! | measurements | `bench` |
 
+mod bench;
 mod cli;
 pub mod doctor;
 mod error;
 mod figures;
 pub mod file;
+mod live;
+mod log;
 pub mod new;
 mod run;
 pub mod schema;

@@ -7,11 +7,10 @@ use std::time::Duration as HostDuration;
 
 use clap::{Args, Subcommand};
 use control::{Client, ClientError, Event};
-use runtime::Plan;
 use serde_json::{Value as Json, json};
 
 use crate::error::Failure;
-use crate::{file, run, terminal};
+use crate::terminal;
 
 /// Which system is meant.
 #[derive(Args, Clone, Debug)]
@@ -187,9 +186,13 @@ fn show_answer(answer: &Json, text: fn(&Json) -> String, json: bool) {
 fn graph(which: &Which, dot: bool, toml: bool, json: bool) -> Result<ExitCode, Failure> {
     let mut client = connect(which)?;
     if toml {
-        let plan = ask(&mut client, &["plan".to_owned()])?;
-        let text = plan_text(&plan)?;
-        if json { terminal::say_json(&json!({"toml": text})) } else { terminal::say(&text) }
+        let answer = ask(&mut client, &["file".to_owned()])?;
+        let text = answer.as_str().unwrap_or_default();
+        if json {
+            terminal::say_json(&json!({"toml": text}))
+        } else {
+            terminal::say(text)
+        }
         return Ok(ExitCode::SUCCESS);
     }
     let answer = ask(&mut client, &["graph".to_owned()])?;
@@ -199,15 +202,6 @@ fn graph(which: &Which, dot: bool, toml: bool, json: bool) -> Result<ExitCode, F
         false => show_answer(&answer, shown::graph, json),
     }
     Ok(ExitCode::SUCCESS)
-}
-
-/// The running plan as a system file. What the runtime does not know of it (world, robots, goal) comes from the file that was
-/// run; see the run's own command `file`.
-fn plan_text(answer: &Json) -> Result<String, Failure> {
-    let (agents, wires) = control::shapes::read_plan(answer)?;
-    let name = answer["system"].as_str().unwrap_or_default();
-    let plan = Plan { agents, wires, ..Plan::new(name) };
-    Ok(file::write_plan(&run::plan_of_file(plan)))
 }
 
 /// How often `top` looks.
@@ -257,7 +251,9 @@ fn tap(which: &Which, port: &str, every: u64, count: Option<u64>, json: bool) ->
                 left -= 1;
                 terminal::say(&shown::heard(&header, &message));
             }
-            Event::Lost { count, .. } => terminal::tell(&format!("{count} messages were lost: this reader was too slow")),
+            Event::Lost { count, .. } => {
+                terminal::tell(&format!("{count} messages were lost: this reader was too slow"))
+            }
         }
     }
     if json && count.is_some() {

@@ -66,7 +66,9 @@ pub(crate) fn log(command: LogCommand, json: bool) -> Result<ExitCode, Failure> 
             let folder = out.unwrap_or_else(|| log.parent().map(PathBuf::from).unwrap_or_default());
             let files = figures::of_log(&log, &folder, None).map_err(wrong)?;
             if files.is_empty() {
-                return Err(Failure::new(format!("{} holds nothing that could be drawn", log.display())).code(1));
+                return Err(
+                    Failure::new(format!("{} holds nothing that could be drawn", log.display())).code(1)
+                );
             }
             let names: Vec<String> = files.iter().map(|file| file.display().to_string()).collect();
             if json { terminal::say_json(&json!({"files": names})) } else { terminal::say(&names.join("\n")) }
@@ -127,7 +129,12 @@ fn info_text(info: &Info) -> String {
         out += &format!("a log of another program ({})\n", info.library);
     }
     if let Some((from, to)) = info.span {
-        out += &format!("{} messages over {:.2} s, from {:.2} s\n", info.messages, (to - from).seconds(), from.seconds());
+        out += &format!(
+            "{} messages over {:.2} s, from {:.2} s\n",
+            info.messages,
+            (to - from).seconds(),
+            from.seconds()
+        );
     }
     if !info.whole {
         out += "the file has no proper end; \"sinew log repair\" makes one\n";
@@ -164,7 +171,11 @@ fn play(log: &std::path::Path, topics: &[String], speed: Speed, json: bool) -> R
             terminal::pause(HostDuration::from_secs_f64(due).saturating_sub(begun.elapsed()));
         }
         shown += 1;
-        if json { terminal::say_json(&message_json(&message)) } else { terminal::say(&message_text(&message)) }
+        if json {
+            terminal::say_json(&message_json(&message))
+        } else {
+            terminal::say(&message_text(&message))
+        }
     }
     for damage in reader.damage() {
         terminal::tell(&format!("damaged: {damage}"));
@@ -207,15 +218,22 @@ fn mend(log: &std::path::Path, out: &std::path::Path, json: bool) -> Result<(), 
         terminal::say_json(&json!({
             "file": out.display().to_string(),
             "messages": repaired.messages,
+            "was_whole": repaired.was_whole,
             "lost_messages": lost,
             "lost_from_s": repaired.lost_span().map(|span| span.0.seconds()),
             "lost_to_s": repaired.lost_span().map(|span| span.1.seconds()),
-            "damage": repaired.damage.iter().map(ToString::to_string).collect::<Vec<_>>(),
+            "damage": repaired.lost.iter().map(ToString::to_string).collect::<Vec<_>>(),
         }));
         return Ok(());
     }
     let mut text = format!("{}: {} messages", out.display(), repaired.messages);
-    for damage in &repaired.damage {
+    if repaired.was_whole {
+        text += "; the log was whole already";
+    }
+    if repaired.nameless > 0 {
+        text += &format!("\nlost: {} messages whose topic stood in a lost part", repaired.nameless);
+    }
+    for damage in &repaired.lost {
         text += &format!("\nlost: {damage}");
     }
     terminal::say(&text);

@@ -26,7 +26,10 @@ pub fn schema(registry: &Registry) -> Json {
         (wires_, wires()),
         (decide_, decide()),
         (goal_, goal()),
-        (vary_, json!({"type": "object", "description": "What a seed draws: an entry and its distribution."})),
+        (
+            vary_,
+            json!({"type": "object", "description": "What a seed draws: an entry and its distribution."}),
+        ),
         (at_, json!({"type": "array", "items": request(), "description": "Timed requests and faults."})),
     ]);
     json!({
@@ -113,10 +116,16 @@ fn agent(kind: &AgentType) -> Json {
         ("period", time("Time between two steps.")),
         ("period_min", time("The shortest period that its designer allows.")),
         ("period_max", time("The longest period that its designer allows.")),
-        ("deadline", time("How soon after its release a step must be done; the period when nothing is said.")),
+        (
+            "deadline",
+            time("How soon after its release a step must be done; the period when nothing is said."),
+        ),
         ("on", on),
         ("min_gap", time("The least time between two steps that messages make it run.")),
-        ("executor", open_choice(executors, "The thread it runs on; chosen by the deadline when nothing is said.")),
+        (
+            "executor",
+            open_choice(executors, "The thread it runs on; chosen by the deadline when nothing is said."),
+        ),
         ("on_death", choice(["restart", "leave"], "What happens when it dies.")),
         ("hang_after", time("How long a step may last before it is taken for one that does not return.")),
     ];
@@ -180,7 +189,8 @@ fn world_() -> Json {
 fn robot(kind: Option<&AgentType>) -> Json {
     let gate = kind.map(|kind| kind.params.as_slice()).unwrap_or_default();
     let driver = open_choice(["sim"], "Its driver: sim, carmen:FILE, ticks:FILE or replay:FILE.");
-    let rows = [("driver", driver)].into_iter().chain(gate.iter().map(|field| (field.name, parameter(field))));
+    let rows =
+        [("driver", driver)].into_iter().chain(gate.iter().map(|field| (field.name, parameter(field))));
     json!({
         "type": "object",
         "properties": object(rows),
@@ -223,7 +233,12 @@ fn wires() -> Json {
 fn decide() -> Json {
     let situations: Vec<(&str, Json)> = agents::decision_maker::Situation::ALL
         .iter()
-        .map(|situation| (situation.name(), json!({"type": "object", "description": "The weight of each agent, from 0 to 1."})))
+        .map(|situation| {
+            (
+                situation.name(),
+                json!({"type": "object", "description": "The weight of each agent, from 0 to 1."}),
+            )
+        })
         .collect();
     json!({
         "type": "object",
@@ -246,10 +261,13 @@ fn goal() -> Json {
         ],
         &[],
     );
-    let collisions = json!({"type": "integer", "minimum": 0, "description": "How many collisions are forgiven."});
+    let collisions =
+        json!({"type": "integer", "minimum": 0, "description": "How many collisions are forgiven."});
     let stages = json!({"type": "array", "items": stage, "description": "The stages, one after another."});
-    let mut schema =
-        closed([("within", time("The time for the whole.")), ("collisions", collisions), ("stage", stages)], &["stage"]);
+    let mut schema = closed(
+        [("within", time("The time for the whole.")), ("collisions", collisions), ("stage", stages)],
+        &["stage"],
+    );
     schema["description"] = json!("What makes a run a success.");
     schema
 }

@@ -6,7 +6,7 @@
 
 #![allow(unsafe_code)]
 
-use core::sync::atomic::{AtomicU32, AtomicU64, Ordering};
+use core::sync::atomic::{AtomicU32, AtomicU64, Ordering, compiler_fence};
 use std::any::Any;
 use std::cmp::Reverse;
 use std::collections::BinaryHeap;
@@ -430,6 +430,8 @@ impl Core {
             }
             (first, panics, seat.on.iter().map(|input| input.taken()).sum::<u64>())
         };
+        // SAFETY: as above. The figures are shared with the watchdog's side and outlive the core, whoever has it.
+        let running = unsafe { &*Arc::as_ptr(&(*core).running) };
         let mut body = Some(body);
         let result = catch_unwind(AssertUnwindSafe(|| {
             if panics {
@@ -442,13 +444,16 @@ impl Core {
             body.step(&mut step)
         }));
         let ended = os::ticks();
+        // First the step is published as ended, then it is asked whose the core is: the watchdog does it the other way round,
+        // with a barrier on all processors between, so that one of the two sees the other.
+        running.slot.store(0, Ordering::Release);
+        compiler_fence(Ordering::SeqCst);
         if !still_mine() {
             // The watchdog gave the agent up; what it left behind is freed here, on a thread that has lost its priority.
             return None;
         }
         // SAFETY: the core is still this thread's.
         let core = unsafe { &mut *core };
-        core.running.slot.store(0, Ordering::Relaxed);
         let alarm = context.end();
         core.end(context, job, now, result, body, alarm, taken, (begun, ended), witness);
         Some(Ended::Normally)

@@ -158,6 +158,8 @@ fn play(simulation: Simulation) -> Result<Report, CannotRun> {
         }
         player.instant()?;
         let next_supervision = player.supervise();
+        // Who was started again may have messages to take at this very instant.
+        player.instant()?;
         if player.now >= next_look {
             next_look = player.now + observer.every().max(Duration::millis(1));
             if let Verdict::End(reason) = observer.observe(player.now, &player.router.incidents) {

@@ -63,20 +63,29 @@ impl WallClock {
 const NOBODY: u32 = 0;
 
 /// An executor's core and whose it is. A thread touches the core while `owner` is its own number.
+///
+/// ```text
+///            watchdog: the step of n lasts too long
+///   n ───────────────────────────────────────────────► n, marked
+///   ▲                                                   │    │
+///   └── n came back in time (n itself, or the watchdog) ┘    │ watchdog: n is still in that step
+///                                                            ▼
+///   m ◄──────────────── the spare thread m takes it ──────  FREE
+/// ```
 struct Cell {
     core: UnsafeCell<Core>,
-    /// The number of the thread that owns the core.
+    /// The number of the thread that owns the core, perhaps marked, or [`FREE`].
     owner: AtomicU32,
-    /// Decides between the watchdog and a thread that came back at the last moment: zero, or the number of the winner.
-    claim: AtomicU32,
     /// The kernel's number of the owner's thread.
     thread: AtomicI32,
     /// The slot that was given up, for the thread that takes over; plus one.
     given_up: AtomicU32,
     running: Arc<Running>,
     door: Arc<Door>,
-    /// Where the spare thread waits for its number.
+    /// Where the spare thread waits to be called; it takes the call back when it has the core.
     call: AtomicU32,
+    /// Whether the spare thread has been used up, and another is to be made.
+    needs_spare: AtomicBool,
     granted: Mutex<Option<String>>,
     stop: AtomicBool,
 }
@@ -208,12 +217,12 @@ impl Runner {
         }
         let cell = Arc::new(Cell {
             owner: AtomicU32::new(NOBODY),
-            claim: AtomicU32::new(0),
             thread: AtomicI32::new(0),
             given_up: AtomicU32::new(0),
             running: core.running.clone(),
             door: core.door.clone(),
             call: AtomicU32::new(NOBODY),
+            needs_spare: AtomicBool::new(false),
             granted: Mutex::new(None),
             stop: AtomicBool::new(false),
             core: UnsafeCell::new(core),
@@ -246,10 +255,9 @@ impl Runner {
 
     fn start_guards(&mut self) -> Result<(), CannotRun> {
         let (cells, over, hung) = (self.cells.clone(), self.over.clone(), self.hung.clone());
-        let next = Arc::new(AtomicU32::new(self.next_thread + 1_000_000));
         let watchdog = std::thread::Builder::new()
             .name("sinew-watchdog".into())
-            .spawn(move || watch(&cells, &over, &hung, &next))
+            .spawn(move || watch(&cells, &over, &hung))
             .map_err(|error| CannotRun::NoThread(error.to_string()))?;
         self.guards.push(watchdog);
         for cpu in 0..std::thread::available_parallelism().map_or(1, usize::from) {
@@ -287,8 +295,8 @@ impl Runner {
             }
         };
         let now = self.clock.now();
-        let view = self.router.view(now);
         self.end();
+        let view = self.router.view(now);
         let log_dropped = self.log.finish();
         Ok(Report {
             ended,
@@ -346,7 +354,7 @@ impl Runner {
     /// Where a spare thread has taken over, another is made.
     fn make_spares(&mut self) -> Result<(), CannotRun> {
         for at in 0..self.cells.len() {
-            if self.cells[at].call.swap(NOBODY, Ordering::AcqRel) == CALLED {
+            if self.cells[at].needs_spare.swap(false, Ordering::AcqRel) {
                 self.spawn_spare(at)?;
             }
         }
@@ -455,23 +463,17 @@ fn thread_main(
         if cell.stop.load(Ordering::Acquire) {
             return;
         }
-        if cell.call.load(Ordering::Acquire) == CALLED {
-            // The watchdog has called: whoever waits may take the core that was given up.
+        if cell.call.load(Ordering::Acquire) == CALLED
+            && cell.owner.compare_exchange(FREE, number, Ordering::AcqRel, Ordering::Relaxed).is_ok()
+        {
             let given_up = cell.given_up.load(Ordering::Acquire);
-            let from = cell.owner.load(Ordering::Acquire);
-            if given_up != 0
-                && from >= HANDED
-                && cell.owner.compare_exchange(from, number, Ordering::AcqRel, Ordering::Relaxed).is_ok()
-            {
-                cell.given_up.store(0, Ordering::Release);
-                cell.claim.store(0, Ordering::Release);
-                // SAFETY: the exchange made the core this thread's own.
-                let core = unsafe { &mut *cell.core.get() };
-                core.running.slot.store(0, Ordering::Relaxed);
-                core.give_up(given_up - 1, clock.now());
-                core.find_ready();
-                break;
-            }
+            cell.call.store(NOBODY, Ordering::Release);
+            cell.needs_spare.store(true, Ordering::Release);
+            // SAFETY: the exchange made the core this thread's own.
+            let core = unsafe { &mut *cell.core.get() };
+            core.give_up(given_up - 1, clock.now());
+            core.find_ready();
+            break;
         }
         os::futex_wait(&cell.call, cell.call.load(Ordering::Acquire) & !CALLED, None);
     }
@@ -559,37 +561,33 @@ fn hang(cell: &Cell, number: u32, slot: u32) -> bool {
     cell.running.since.store(os::ticks(), Ordering::Relaxed);
     cell.running.steps.store(cell.running.steps.load(Ordering::Relaxed) + 1, Ordering::Relaxed);
     cell.running.slot.store(slot + 1, Ordering::Release);
-    while cell.owner.load(Ordering::Acquire) == number && !cell.stop.load(Ordering::Acquire) {
+    let still = |owner: u32| owner == number || owner == number | MARK;
+    while still(cell.owner.load(Ordering::Acquire)) {
+        if cell.stop.load(Ordering::Acquire) {
+            cell.running.slot.store(0, Ordering::Relaxed);
+            return is_mine(cell, number);
+        }
         core::hint::spin_loop();
     }
-    let mine = is_mine(cell, number);
-    if mine {
-        cell.running.slot.store(0, Ordering::Relaxed);
-    }
-    mine
+    false
 }
 
-/// Owners at or above this number are marks of the watchdog: the core is on its way to another thread.
-const HANDED: u32 = 1_000_000;
+/// Stands in `owner` beside the number of a thread that the watchdog is about to give up.
+const MARK: u32 = 1 << 31;
+/// Stands in `owner` when the core waits for the spare thread.
+const FREE: u32 = MARK - 1;
 
 /// After a step: whether the core is still this thread's own. The usual case costs one load; the watchdog's side makes the
 /// barrier that orders it behind what the step published.
 #[inline]
 fn is_mine(cell: &Cell, number: u32) -> bool {
-    if cell.owner.load(Ordering::Relaxed) == number {
-        return true;
-    }
-    // The watchdog is about to give this thread up. Whoever claims first has the core.
-    if cell.claim.compare_exchange(0, number, Ordering::AcqRel, Ordering::Acquire).is_ok() {
-        cell.owner.store(number, Ordering::Release);
-        cell.claim.store(0, Ordering::Release);
-        return true;
-    }
-    false
+    cell.owner.load(Ordering::Acquire) == number
+        // The watchdog is about to give this thread up. Whoever makes the exchange first has the core.
+        || cell.owner.compare_exchange(number | MARK, number, Ordering::AcqRel, Ordering::Acquire).is_ok()
 }
 
 /// The watchdog: sees steps that last too long, gives their threads up, and hands what else they ran to the spare ones.
-fn watch(cells: &[Arc<Cell>], over: &AtomicBool, hung: &AtomicU32, next: &AtomicU32) {
+fn watch(cells: &[Arc<Cell>], over: &AtomicBool, hung: &AtomicU32) {
     os::exact_timers();
     // Without the right to a priority it watches all the same, later.
     let _ = os::set_fifo(WATCHDOG_PRIORITY);
@@ -605,7 +603,7 @@ fn watch(cells: &[Arc<Cell>], over: &AtomicBool, hung: &AtomicU32, next: &Atomic
             }
             let lasts =
                 os::ticks().saturating_sub(running.since.load(Ordering::Acquire)) as f64 * nanos_per_tick;
-            if lasts > running.limit.load(Ordering::Acquire) as f64 && take_over(cell, slot, steps, next) {
+            if lasts > running.limit.load(Ordering::Acquire) as f64 && take_over(cell, slot, steps) {
                 hung.fetch_add(1, Ordering::Relaxed);
             }
         }
@@ -613,24 +611,24 @@ fn watch(cells: &[Arc<Cell>], over: &AtomicBool, hung: &AtomicU32, next: &Atomic
 }
 
 /// Takes a core away from a thread that does not come back.
-fn take_over(cell: &Cell, slot: u32, steps: u64, next: &AtomicU32) -> bool {
+fn take_over(cell: &Cell, slot: u32, steps: u64) -> bool {
     let owner = cell.owner.load(Ordering::Acquire);
-    if owner >= HANDED || cell.call.load(Ordering::Acquire) != NOBODY {
+    let no_spare = cell.call.load(Ordering::Acquire) != NOBODY || cell.needs_spare.load(Ordering::Acquire);
+    if owner >= FREE
+        || no_spare
+        || cell.owner.compare_exchange(owner, owner | MARK, Ordering::SeqCst, Ordering::Relaxed).is_err()
+    {
         // It is on its way already, or no spare thread is there yet.
         return false;
     }
-    let mark = next.fetch_add(1, Ordering::Relaxed);
-    cell.owner.store(mark, Ordering::SeqCst);
     // After this, either the thread is still in the step and will see the mark, or it has left it and that is seen here.
     os::barrier_everywhere();
     let still_in = cell.running.slot.load(Ordering::SeqCst) == slot
         && cell.running.steps.load(Ordering::SeqCst) == steps;
-    if !still_in {
-        // It came back and is at work: the mark is taken off, unless the thread has seen it and done so itself.
-        let _ = cell.owner.compare_exchange(mark, owner, Ordering::AcqRel, Ordering::Relaxed);
-        return false;
-    }
-    if cell.claim.compare_exchange(0, mark, Ordering::AcqRel, Ordering::Acquire).is_err() {
+    let next = if still_in { FREE } else { owner };
+    let done = cell.owner.compare_exchange(owner | MARK, next, Ordering::AcqRel, Ordering::Relaxed).is_ok();
+    if !still_in || !done {
+        // It came back and is at work.
         return false;
     }
     // A failure leaves the thread where it is, at its priority; there is nothing else to be done about it.

@@ -82,7 +82,13 @@ fn preemption(realtime: Option<String>, version: Option<String>) -> Option<Strin
         return Some("PREEMPT_RT".to_owned());
     }
     let version = version?;
-    Some(version.split_whitespace().find(|word| word.starts_with("PREEMPT")).unwrap_or("no preemption").to_owned())
+    Some(
+        version
+            .split_whitespace()
+            .find(|word| word.starts_with("PREEMPT"))
+            .unwrap_or("no preemption")
+            .to_owned(),
+    )
 }
 
 /// Processors in `Cpus_allowed_list: 0-3,6`.
@@ -134,11 +140,14 @@ fn quota(root: &Path, cgroup: &str) -> Option<String> {
         };
         for group in Path::new(path.trim_start_matches('/')).ancestors() {
             let folder = root.join(mount).join(group);
-            let text = |file: &str| fs::read_to_string(folder.join(file)).ok().map(|text| text.trim().to_owned());
+            let text =
+                |file: &str| fs::read_to_string(folder.join(file)).ok().map(|text| text.trim().to_owned());
             let found = if second {
                 text("cpu.max")
             } else {
-                text("cpu.cfs_quota_us").zip(text("cpu.cfs_period_us")).map(|(quota, period)| format!("{quota} {period}"))
+                text("cpu.cfs_quota_us")
+                    .zip(text("cpu.cfs_period_us"))
+                    .map(|(quota, period)| format!("{quota} {period}"))
             };
             let Some(found) = found else { continue };
             let share = share(&found);
@@ -198,7 +207,10 @@ mod tests {
         }
         let machine = Machine::read(&root);
         fs::remove_dir_all(&root).unwrap();
-        assert_eq!((machine.kernel.as_str(), machine.preemption.as_deref()), ("6.12.9-rt", Some("PREEMPT_DYNAMIC")));
+        assert_eq!(
+            (machine.kernel.as_str(), machine.preemption.as_deref()),
+            ("6.12.9-rt", Some("PREEMPT_DYNAMIC"))
+        );
         assert_eq!((machine.cores, machine.can_lock_all), (4, true));
         assert_eq!(machine.limit("Max locked memory"), Some("8388608"));
         assert_eq!(machine.limit("Max realtime priority"), Some("95"));

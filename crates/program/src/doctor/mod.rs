@@ -119,9 +119,7 @@ impl Examination {
 
     /// `{"real_time","verdict","lines":[{"name","state","found","mend"}]}`.
     pub fn to_json(&self) -> Json {
-        let line = |line: &Line| {
-            json!({"name": line.name, "state": line.state.name(), "found": line.found, "mend": line.mend})
-        };
+        let line = |line: &Line| json!({"name": line.name, "state": line.state.name(), "found": line.found, "mend": line.mend});
         let lines: Vec<Json> = self.lines.iter().map(line).collect();
         json!({"real_time": self.real_time(), "verdict": self.verdict(), "lines": lines})
     }
@@ -172,6 +170,7 @@ fn memory(machine: &Machine) -> Line {
         None => State::Unseen,
     };
     let found = match limit {
+        _ if machine.can_lock_all => "any amount can be locked, as this user may".to_owned(),
         Some(bytes) => match bytes.parse::<u64>() {
             Ok(bytes) => format!("{} MiB can be locked", bytes >> 20),
             Err(_) => "any amount can be locked".to_owned(),
@@ -186,7 +185,10 @@ fn memory(machine: &Machine) -> Line {
 fn throttling(machine: &Machine) -> Line {
     let (state, found) = match machine.rt_runtime_us {
         Some(-1) => (State::Good, "off".to_owned()),
-        Some(us) => (State::Weak, format!("real-time threads stop after {us} us of every {} us", machine.rt_period_us)),
+        Some(us) => (
+            State::Weak,
+            format!("real-time threads stop after {us} us of every {} us", machine.rt_period_us),
+        ),
         None => (State::Unseen, "not told".to_owned()),
     };
     let mend = "a busy executor is held up for the rest of the period: sysctl kernel.sched_rt_runtime_us=-1, where you trust \
@@ -197,7 +199,9 @@ fn throttling(machine: &Machine) -> Line {
 fn governor(machine: &Machine) -> Line {
     let (state, found) = match machine.governors.as_slice() {
         [] => (State::Unseen, "the frequency is not ours to set".to_owned()),
-        governors if governors.iter().all(|governor| governor == "performance") => (State::Good, "performance".to_owned()),
+        governors if governors.iter().all(|governor| governor == "performance") => {
+            (State::Good, "performance".to_owned())
+        }
         governors => (State::Weak, governors.join(", ")),
     };
     line("governor", state, found, "a core that slept wakes up slowly: cpupower frequency-set -g performance")
@@ -246,7 +250,12 @@ fn folder(machine: &Machine, folder: &Path) -> Line {
         None => State::Unseen,
     };
     let mend = "the latch must lie in memory, or setting it can wait for a disk: set XDG_RUNTIME_DIR to a folder on tmpfs";
-    line("run folder", state, format!("{} on {}", folder.display(), kind.unwrap_or("an unknown file system")), mend)
+    line(
+        "run folder",
+        state,
+        format!("{} on {}", folder.display(), kind.unwrap_or("an unknown file system")),
+        mend,
+    )
 }
 
 #[cfg(test)]
@@ -316,7 +325,10 @@ mod tests {
         let examination = Examination::of(&machine(), "ordinary", Path::new("/run/user/7/sinew"));
         let (text, json) = (examination.to_text(), examination.to_json());
         assert!(text.starts_with("ok       kernel       6.12.0 PREEMPT_RT\n"), "{text}");
-        assert!(text.contains("missing  priority     asked for fifo 70, got ordinary (limit 95)\n"), "{text}");
+        assert!(
+            text.contains("missing  priority     asked for fifo 70, got ordinary (limit 95)\n"),
+            "{text}"
+        );
         assert_eq!((&json["real_time"], &json["lines"][2]["state"]), (&false.into(), &"missing".into()));
         assert!(json["lines"][2]["mend"].as_str().unwrap().starts_with("allow it"));
     }

@@ -24,10 +24,23 @@ pub(crate) fn notes(ready: &Ready) -> Notes {
             "name": robot.name,
             "radius": robot.radius,
             "recorded": robot.description.clock == hardware::ClockKind::Recorded,
+            "command": command_of(ready, &robot.name),
         })
     });
     notes.insert(ROBOTS.into(), Json::Array(robots.collect()).to_string());
     notes
+}
+
+/// The topic of what the robot's wheels are told: the output that is joined to its "drive".
+fn command_of(ready: &Ready, robot: &str) -> Option<String> {
+    let own = ready.plan.agents.iter().filter(|agent| agent.robot.as_deref() == Some(robot));
+    let mut joined = own.filter_map(|agent| {
+        let kind = ready.registry.get(&agent.kind)?;
+        let port = kind.ports.iter().find(|port| port.options.robot == Some("drive"))?;
+        Some(format!("/{}/{}", agent.name, port.name))
+    });
+    let wire = ready.plan.wires.iter().find(|wire| wire.to == format!("{robot}.drive"));
+    joined.next_back().or(wire.map(|wire| format!("/{}", wire.from.replace('.', "/"))))
 }
 
 fn point(point: Point) -> Json {
@@ -77,13 +90,20 @@ pub(super) fn drawing(notes: &Notes) -> Drawing {
 pub(super) struct KnownRobot {
     pub(super) name: String,
     pub(super) radius: f64,
+    /// The topic of what its wheels are told.
+    pub(super) command: Option<String>,
 }
 
 /// The robots of a log.
 pub(super) fn robots(notes: &Notes) -> Vec<KnownRobot> {
-    let rows = notes.get(ROBOTS).and_then(|text| serde_json::from_str::<Vec<Json>>(text).ok()).unwrap_or_default();
+    let rows =
+        notes.get(ROBOTS).and_then(|text| serde_json::from_str::<Vec<Json>>(text).ok()).unwrap_or_default();
     let robot = |row: &Json| {
-        Some(KnownRobot { name: row["name"].as_str()?.to_owned(), radius: row["radius"].as_f64()? })
+        Some(KnownRobot {
+            name: row["name"].as_str()?.to_owned(),
+            radius: row["radius"].as_f64()?,
+            command: row["command"].as_str().map(str::to_owned),
+        })
     };
     rows.iter().filter_map(robot).collect()
 }

@@ -6,7 +6,7 @@ use record::figure::{Band, Drawing, Event};
 use record::log::{Message, RunInfo};
 use types::cdr::Reader;
 use types::message::Message as Typed;
-use types::messages::{Decision, Echoes, LaserScan, Odometry, Twist};
+use types::messages::{Decision, Echoes, LaserScan, Odometry, Transforms, Twist};
 use types::{Point, Pose, Time};
 
 use super::scenery::{self, KnownRobot};
@@ -27,11 +27,11 @@ pub(super) struct Seen {
     /// The same as commanded.
     pub(super) commanded: Vec<(f64, f64, f64)>,
     /// Where its sensors saw something, in the world.
-    pub(super) points: Vec<Point>,
+    pub(super) points: Cloud,
     /// The sensor that saw it.
     pub(super) points_name: &'static str,
-    /// Where the laser saw something, from the log's own poses.
-    pub(super) scan_points: Vec<Point>,
+    /// Where the laser saw something, from the log's own poses, or where there are none by odometry.
+    pub(super) scan_points: Cloud,
 }
 
 /// What figures need of a log.
@@ -50,10 +50,22 @@ pub(super) struct Trail {
     pub(super) span: Option<(f64, f64)>,
     known: Vec<KnownRobot>,
     begun: Option<Time>,
+    /// Where the laser sits on the robot.
+    laser: Pose,
 }
 
 /// More points than this make a figure heavy and not clearer.
 const MOST_POINTS: usize = 60_000;
+/// So many points of the ring of sonars show a room and do not cover it.
+pub(super) const SHOWN_POINTS: usize = 2_500;
+/// Commands nearer to each other than this run into one line (s).
+const COMMANDS: f64 = 0.1;
+/// A band shorter than this cannot be seen (s).
+const SHORTEST: f64 = 0.3;
+/// A person who moved less than this stands (m).
+const STANDS: f64 = 0.3;
+/// Radius of a person as drawn (m): from above, with the arms.
+const PERSON: f64 = 0.25;
 /// More events than this cannot be explained below a figure.
 const MOST_EVENTS: usize = 12;
 
@@ -65,7 +77,11 @@ fn decode<T: Typed>(message: &Message) -> Option<(T, Vec<T::Element>)> {
 
 impl Trail {
     pub(super) fn new(run: &RunInfo) -> Trail {
-        Trail { drawing: scenery::drawing(&run.notes), known: scenery::robots(&run.notes), ..Trail::default() }
+        Trail {
+            drawing: scenery::drawing(&run.notes),
+            known: scenery::robots(&run.notes),
+            ..Trail::default()
+        }
     }
 
     pub(super) fn radius(&self, robot: &str) -> f64 {
@@ -80,7 +96,29 @@ impl Trail {
     pub(super) fn bands(&self) -> Vec<Band> {
         let end = self.span.map_or(0.0, |span| span.1);
         let ends = self.says.iter().skip(1).map(|(time, _)| *time).chain([end]);
-        self.says.iter().zip(ends).map(|((from, agent), to)| Band { from: *from, to, agent: agent.clone() }).collect()
+        let mut bands: Vec<Band> = Vec::new();
+        for ((from, agent), to) in self.says.iter().zip(ends) {
+            match bands.last_mut() {
+                // What is too short to be seen belongs to who had the say before, and so does what follows of the same.
+                Some(last) if to - from < SHORTEST || last.agent == *agent => last.to = to,
+                None if to - from < SHORTEST => {}
+                _ => bands.push(Band { from: *from, to, agent: agent.clone() }),
+            }
+        }
+        bands
+    }
+
+    /// The ways of the people who walked; those who stand become part of the drawing.
+    pub(super) fn settle(&mut self) {
+        let people = std::mem::take(&mut self.people);
+        for (name, way) in people {
+            let Some(first) = way.first().copied() else { continue };
+            if way.iter().any(|at| at.distance(first) > STANDS) {
+                self.people.insert(name, way);
+            } else {
+                self.drawing.circles.push((first, PERSON));
+            }
+        }
     }
 
     /// Takes in a message; what no figure needs is passed over.
@@ -92,8 +130,10 @@ impl Trail {
         *span = (span.0.min(time), span.1.max(time));
         let topic = message.channel.topic.clone();
         let Some((agent, port)) = topic.strip_prefix('/').and_then(|topic| topic.split_once('/')) else {
-            if topic == record::log::ROSOUT {
-                self.note(time, message);
+            match topic.as_str() {
+                record::log::ROSOUT => self.note(time, message),
+                "/tf" => self.mounts(message),
+                _ => {}
             }
             return;
         };
@@ -107,7 +147,7 @@ impl Trail {
             Echoes::NAME if self.is_robot(agent) => self.echoes(agent, message),
             LaserScan::NAME if self.is_robot(agent) && port == "scan" => self.scan(agent, message),
             Odometry::NAME => self.odometry(time, agent, port, message),
-            Twist::NAME => self.command(time, port, message),
+            Twist::NAME => self.command(time, &topic, message),
             _ => {}
         }
     }
@@ -150,16 +190,27 @@ impl Trail {
         for echo in ring.echoes.iter().filter(|echo| echo.range.is_finite() && echo.range < far.min(NEAR)) {
             let place = Pose::new(echo.x.into(), echo.y.into(), echo.bearing.into());
             let at = pose.then(place).transform(Point::new(echo.range.into(), 0.0));
-            add(&mut seen.points, at);
+            seen.points.add(at);
+        }
+    }
+
+    /// Where the laser sits. A scan does not say it.
+    fn mounts(&mut self, message: &Message) {
+        let Some((tree, _)) = decode::<Transforms>(message) else { return };
+        if let Some(edge) = tree.edges.iter().find(|edge| edge.child.as_str() == hardware::description::LASER)
+        {
+            self.laser = edge.pose;
         }
     }
 
     fn scan(&mut self, robot: &str, message: &Message) {
         let Some((scan, ranges)) = decode::<LaserScan>(message) else { return };
+        let mount = self.laser;
         let seen = self.robot(robot);
-        let truth = seen.way.last().map(|(_, pose)| *pose);
-        let Some(pose) = truth.or(seen.log_way.last().map(|(_, pose)| *pose)) else { return };
-        let mount = Pose::new(scan.mount_x.into(), scan.mount_y.into(), scan.mount_heading.into());
+        let last = |way: &[(f64, Pose)]| way.last().map(|(_, pose)| *pose);
+        let truth = last(&seen.way);
+        let believed = if seen.log_way.is_empty() { last(&seen.odometry) } else { last(&seen.log_way) };
+        let Some(pose) = truth.or(believed) else { return };
         let far = scan.range_max - 0.01;
         for (i, range) in ranges.iter().enumerate() {
             if !range.is_finite() || *range <= scan.range_min.max(0.02) || *range >= far {
@@ -168,8 +219,8 @@ impl Trail {
             let bearing = f64::from(scan.angle_min) + i as f64 * f64::from(scan.angle_step);
             let at = pose.then(mount).transform(Point::polar(f64::from(*range), bearing));
             match truth {
-                Some(_) => add(&mut seen.points, at),
-                None => add(&mut seen.scan_points, at),
+                Some(_) => seen.points.add(at),
+                None => seen.scan_points.add(at),
             }
         }
         if truth.is_some() {
@@ -181,20 +232,29 @@ impl Trail {
         let Some((odometry, _)) = decode::<Odometry>(message) else { return };
         if self.is_robot(agent) && port == "pose" {
             let seen = self.robot(agent);
+            // Many recordings tell where the robot was and not how fast: that is the way between two poses.
+            if let Some((before, last)) =
+                seen.log_way.last().copied().filter(|(before, _)| time - before > 1e-3)
+            {
+                let (span, way) = (time - before, last.inverse().then(odometry.pose));
+                seen.speed.push((time, way.x / span, way.heading / span));
+            }
             seen.log_way.push((time, odometry.pose));
-            seen.speed.push((time, odometry.twist.linear, odometry.twist.angular));
         } else if let [only] = &self.known[..] {
             let name = only.name.clone();
             self.robot(&name).odometry.push((time, odometry.pose));
         }
     }
 
-    /// What the wheels are told, where it is plain whose they are.
-    fn command(&mut self, time: f64, port: &str, message: &Message) {
-        let ([only], "command" | "drive") = (&self.known[..], port) else { return };
+    /// What the wheels are told.
+    fn command(&mut self, time: f64, topic: &str, message: &Message) {
+        let told = self.known.iter().find(|known| known.command.as_deref() == Some(topic));
+        let Some(name) = told.map(|known| known.name.clone()) else { return };
         let Some((twist, _)) = decode::<Twist>(message) else { return };
-        let name = only.name.clone();
-        self.robot(&name).commanded.push((time, twist.linear, twist.angular));
+        let commanded = &mut self.robot(&name).commanded;
+        if commanded.last().is_none_or(|last| time - last.0 >= COMMANDS) {
+            commanded.push((time, twist.linear, twist.angular));
+        }
     }
 
     fn note(&mut self, time: f64, message: &Message) {
@@ -202,8 +262,9 @@ impl Trail {
         let Some(table) = value.as_table() else { return };
         let text = |key: &str| table.get(key).and_then(|entry| entry.value.as_text()).unwrap_or_default();
         let (who, what) = (text("name"), text("msg"));
-        let tells = ["panicked", "did not return", "started again", "latch is set", "latch is reset"];
-        if self.events.len() < MOST_EVENTS && tells.iter().any(|word| what.contains(word)) {
+        let tells = ["panic: ", "did not return", "started again", "latch is set", "latch is reset"];
+        if self.events.len() < MOST_EVENTS && who != "plan" && tells.iter().any(|word| what.contains(word)) {
+            let what = what.split(" (").next().unwrap_or(what);
             self.events.push(Event { time, text: format!("{who}: {what}") });
         }
     }
@@ -211,17 +272,66 @@ impl Trail {
 
 /// Times below this are counted from a start, above it from the Unix epoch (ns).
 const ONE_DAY: i64 = 86_400 * 1_000_000_000;
-/// A cone is a metre wide beyond this range (m), and its echo says little of where something is.
-const NEAR: f32 = 3.0;
+/// Beyond this range a cone is a metre wide (m), and its echo says little of where something is.
+const NEAR: f32 = 2.0;
 
-/// Adds a point; when there are too many, every second one goes.
-fn add(points: &mut Vec<Point>, point: Point) {
-    if points.len() >= MOST_POINTS {
-        let mut keep = false;
-        points.retain(|_| {
-            keep = !keep;
-            keep
-        });
+/// Points, thinned evenly where there are too many.
+#[derive(Clone, Debug)]
+pub(super) struct Cloud {
+    pub(super) points: Vec<Point>,
+    /// Every so many points one is kept.
+    stride: usize,
+    offered: usize,
+}
+
+impl Default for Cloud {
+    fn default() -> Cloud {
+        Cloud { points: Vec::new(), stride: 1, offered: 0 }
     }
-    points.push(point);
+}
+
+impl Cloud {
+    pub(super) fn is_empty(&self) -> bool {
+        self.points.is_empty()
+    }
+
+    fn add(&mut self, point: Point) {
+        if self.offered.is_multiple_of(self.stride) {
+            if self.points.len() >= MOST_POINTS {
+                let mut number = 0;
+                self.points.retain(|_| {
+                    number += 1;
+                    number % 2 == 1
+                });
+                self.stride *= 2;
+            }
+            if self.offered.is_multiple_of(self.stride) {
+                self.points.push(point);
+            }
+        }
+        self.offered += 1;
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_cloud_that_is_too_large_keeps_its_early_and_its_late_points_alike() {
+        let mut cloud = Cloud::default();
+        (0..MOST_POINTS * 5).for_each(|i| cloud.add(Point::new(i as f64, 0.0)));
+        assert!(cloud.points.len() <= MOST_POINTS && cloud.points.len() > MOST_POINTS / 4);
+        let gaps: Vec<f64> = cloud.points.windows(2).map(|pair| pair[1].x - pair[0].x).collect();
+        assert!(gaps.iter().all(|gap| *gap == gaps[0]), "all as dense");
+    }
+
+    #[test]
+    fn short_bands_and_the_same_again_are_one() {
+        let says = [(0.0, "blind"), (0.1, "wall"), (5.0, "safety"), (5.1, "wall"), (9.0, "track")];
+        let says = says.map(|(time, agent)| (time, agent.to_owned())).to_vec();
+        let bands = Trail { says, span: Some((0.0, 12.0)), ..Trail::default() }.bands();
+        let bands: Vec<_> = bands.iter().map(|band| (band.from, band.to, band.agent.as_str())).collect();
+        assert_eq!(bands, [(0.1, 9.0, "wall"), (9.0, 12.0, "track")]);
+    }
 }

@@ -59,7 +59,10 @@ impl Reader<'_> {
         let before = self.mistakes.len();
         let mut r = TableReader::new(table, at, format!("agent \"{name}\""));
         let mut agent = AgentPlan { name, at, ..AgentPlan::default() };
-        agent.kind = r.required_text("is", "the type of the agent, as in is = \"sonar\"").unwrap_or_default().to_owned();
+        agent.kind = r
+            .required_text("is", "the type of the agent, as in is = \"sonar\"")
+            .unwrap_or_default()
+            .to_owned();
         let kind = self.registry.get(&agent.kind);
         if kind.is_none() && !agent.kind.is_empty() {
             let known = self.registry.types().iter().map(|kind| kind.kind).filter(|kind| *kind != ROBOT);
@@ -127,7 +130,9 @@ fn timing(r: &mut TableReader<'_>, agent: &mut AgentPlan) {
         && deadline > period
     {
         let what = format!("the deadline {deadline} is longer than the period {period}");
-        r.report(Mistake::new(r.place("deadline"), what).help("a step must be done before the next one begins"));
+        r.report(
+            Mistake::new(r.place("deadline"), what).help("a step must be done before the next one begins"),
+        );
     }
     let (least, most) = (span_of_time(r, "period_min"), span_of_time(r, "period_max"));
     if least.is_none() && most.is_none() {
@@ -135,7 +140,10 @@ fn timing(r: &mut TableReader<'_>, agent: &mut AgentPlan) {
     }
     let (Some(least), Some(most)) = (least.or(agent.period), most.or(agent.period)) else {
         let key = if least.is_some() { "period_min" } else { "period_max" };
-        r.report(Mistake::new(r.place(key), format!("\"{key}\" needs a period")).help("write period = \"100ms\", say"));
+        r.report(
+            Mistake::new(r.place(key), format!("\"{key}\" needs a period"))
+                .help("write period = \"100ms\", say"),
+        );
         return;
     };
     let period = agent.period.unwrap_or(least);

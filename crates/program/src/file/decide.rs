@@ -63,7 +63,10 @@ fn check(reader: &mut Reader<'_>, table: &Table) {
                 reader.mistakes.push(mistake);
             }
             if !weight.entry.value.as_float().is_some_and(|weight| (0.0..=1.0).contains(&weight)) {
-                let what = format!("the weight of \"{}\" is {}, not a number from 0 to 1", weight.key, weight.entry.value);
+                let what = format!(
+                    "the weight of \"{}\" is {}, not a number from 0 to 1",
+                    weight.key, weight.entry.value
+                );
                 reader.say(weight.entry.at, what);
             }
         }

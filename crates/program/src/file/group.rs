@@ -138,7 +138,8 @@ impl Reader<'_> {
                 None => {
                     let what = format!("\"{}\" must be a port, not {}", row.key, row.entry.value);
                     self.mistakes.push(
-                        Mistake::new(row.entry.at, what).help("as in pose = \"elbow.pose\", with the name of an agent"),
+                        Mistake::new(row.entry.at, what)
+                            .help("as in pose = \"elbow.pose\", with the name of an agent"),
                     );
                 }
             }

@@ -70,17 +70,34 @@ impl Shelf {
                 })?;
                 Ok(Found { name: shown, text, folder: Some(path.parent().unwrap_or(folder).to_owned()) })
             }
-            Err(error) if error.kind() == ErrorKind::NotFound => Err(self.unknown(name)),
+            Err(error) if error.kind() == ErrorKind::NotFound => Err(self.unknown(name, folder)),
             Err(error) => Err(mistake(format!("{} cannot be read: {error}", path.display()))),
         }
     }
 
-    fn unknown(self, name: &str) -> Mistake {
-        let word = name.rsplit('/').next().unwrap_or(name).trim_end_matches(".toml");
-        let near = nearest(word, self.names()).map_or(String::new(), |near| format!("did you mean \"{near}\"? "));
-        let names: Vec<&str> = self.names().collect();
-        mistake(format!("there is no {} \"{name}\"", self.kind()))
-            .help(format!("{near}built in are: {}; anything else is the path of a file", names.join(", ")))
+    /// Nothing has this name. A path is compared with the files beside it, a name with what is built in.
+    fn unknown(self, name: &str, folder: &Path) -> Mistake {
+        if name.ends_with(".toml") {
+            let path = folder.join(name);
+            let beside = fs::read_dir(path.parent().unwrap_or(folder)).into_iter().flatten().flatten();
+            let files: Vec<String> =
+                beside.filter_map(|entry| entry.file_name().into_string().ok()).collect();
+            let word = name.rsplit('/').next().unwrap_or(name);
+            let near = nearest(word, files.iter().map(String::as_str).filter(|file| file.ends_with(".toml")));
+            let said = mistake(format!("there is no file \"{name}\""));
+            return match near {
+                Some(near) => said.help(format!("did you mean \"{near}\"?")),
+                None => said,
+            };
+        }
+        let said = mistake(format!("there is no {} \"{name}\"", self.kind()));
+        match nearest(name, self.names()) {
+            Some(near) => said.help(format!("did you mean \"{near}\"?")),
+            None => {
+                let names: Vec<&str> = self.names().collect();
+                said.help(format!("built in are: {}; anything else is the path of a file", names.join(", ")))
+            }
+        }
     }
 }
 
@@ -109,7 +126,12 @@ mod tests {
     fn a_name_that_is_nearly_right_is_put_right() {
         let mistake = Shelf::Worlds.find("laborattory", Path::new(".")).unwrap_err();
         assert_eq!(mistake.what, "there is no world \"laborattory\"");
-        assert!(mistake.help.unwrap().starts_with("did you mean \"laboratory\"? built in are: annex, "));
+        assert_eq!(mistake.help.as_deref(), Some("did you mean \"laboratory\"?"));
+        let mistake = Shelf::Worlds.find("moon", Path::new(".")).unwrap_err();
+        assert!(mistake.help.unwrap().starts_with("built in are: annex, "));
+        let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../worlds");
+        let mistake = Shelf::Worlds.find("anex.toml", &folder).unwrap_err();
+        assert_eq!(mistake.to_string(), "there is no file \"anex.toml\"; did you mean \"annex.toml\"?");
     }
 
     #[test]

@@ -231,7 +231,10 @@ impl<'r> Reader<'r> {
                     Some(n) => executor.priority = Some(n),
                     None => {
                         let what = format!("\"priority\" is {n}, it must lie from 1 to 94");
-                        r.report(Mistake::new(r.place("priority"), what).help("95 and above belong to the witness"));
+                        r.report(
+                            Mistake::new(r.place("priority"), what)
+                                .help("95 and above belong to the witness"),
+                        );
                     }
                 }
             }
@@ -336,10 +339,13 @@ impl<'r> Reader<'r> {
         }
         let Some(entry) = tree.get("goal") else { return };
         match (&entry.value, world) {
-            (Value::Table(table), Some(world)) => drop(Goal::read(table, entry.at, &world, &mut self.mistakes)),
+            (Value::Table(table), Some(world)) => {
+                drop(Goal::read(table, entry.at, &world, &mut self.mistakes))
+            }
             (Value::Table(_), None) if tree.get("world").is_none() => {
                 let what = "a goal is measured in a simulated world, and there is none";
-                self.mistakes.push(Mistake::new(entry.at, what).help("name one, as in world = \"laboratory\""));
+                self.mistakes
+                    .push(Mistake::new(entry.at, what).help("name one, as in world = \"laboratory\""));
             }
             // What is wrong with the world has been said.
             (Value::Table(_), None) => {}
@@ -353,7 +359,8 @@ impl<'r> Reader<'r> {
             Value::Table(table) => table.clone(),
             Value::Text(name) => {
                 let found = Shelf::Worlds.find(name, &self.folder);
-                let found = found.map_err(|mistake| self.mistakes.push(Mistake { at: entry.at, ..mistake })).ok()?;
+                let found =
+                    found.map_err(|mistake| self.mistakes.push(Mistake { at: entry.at, ..mistake })).ok()?;
                 let base = self.sources.add(found.name, found.text);
                 tree::read(&self.sources, base, &mut self.mistakes)?
             }
@@ -381,7 +388,10 @@ pub(super) fn span_of_time(r: &mut TableReader<'_>, key: &str) -> Option<Duratio
     let entry = r.entry(key)?;
     if let Some(number) = entry.value.as_float() {
         let what = format!("\"{key}\" is {number} without a unit");
-        r.report(Mistake::new(entry.at, what).help(format!("write \"{number}ms\" or \"{number}s\", with the quotes")));
+        r.report(
+            Mistake::new(entry.at, what)
+                .help(format!("write \"{number}ms\" or \"{number}s\", with the quotes")),
+        );
         return None;
     }
     let span = r.duration(key)?;

@@ -15,7 +15,9 @@ impl Reader<'_> {
             && entry.value.as_list().is_none()
         {
             let what = format!("\"at\" is {}, not a list", entry.value.kind());
-            self.mistakes.push(Mistake::new(entry.at, what).help("write [[at]] with two brackets, once for each request"));
+            self.mistakes.push(
+                Mistake::new(entry.at, what).help("write [[at]] with two brackets, once for each request"),
+            );
             return;
         }
         let mut outer = TableReader::new(tree, Span::default(), "the file");
@@ -55,7 +57,8 @@ impl Reader<'_> {
         }
         let [target, kind] = rest else {
             let what = "a fault has a target and a kind";
-            self.mistakes.push(Mistake::new(at, what).help("as in \"fault wall panic\", or \"fault h1.sonar off\""));
+            self.mistakes
+                .push(Mistake::new(at, what).help("as in \"fault wall panic\", or \"fault h1.sonar off\""));
             return;
         };
         let names_agent = self.plan.agent(target).is_some() || self.robots.get(target).is_some();

@@ -89,7 +89,9 @@ fn put_in(
                     .help(format!("it has {count}, numbered from 0"))),
             }
         }
-        other => Err(Mistake::new(at, format!("\"{name}\" is {}, it has no entry \"{first}\"", other.kind()))),
+        other => {
+            Err(Mistake::new(at, format!("\"{name}\" is {}, it has no entry \"{first}\"", other.kind())))
+        }
     }
 }
 

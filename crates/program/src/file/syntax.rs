@@ -24,7 +24,10 @@ pub(super) fn mistakes(text: &str) -> Vec<(Range<usize>, Mistake)> {
                 take_out(&mut rest, bracket..ends.max(bracket + 1), found.len());
             }
             None => {
-                found.push((range.clone(), in_our_words(message, &text[range.clone()], &line_of(text, range.start))));
+                found.push((
+                    range.clone(),
+                    in_our_words(message, &text[range.clone()], &line_of(text, range.start)),
+                ));
                 take_out(&mut rest, range, found.len());
             }
         }
@@ -43,10 +46,10 @@ fn line_of(text: &str, at: usize) -> String {
 fn take_out(text: &mut String, range: Range<usize>, number: usize) {
     let start = text[..range.start].rfind('\n').map_or(0, |at| at + 1);
     let last = range.end.max(range.start + 1).min(text.len()) - 1;
-    let end = text.as_bytes()[last..].iter().position(|&byte| byte == b'\n').map_or(text.len(), |at| last + at);
+    let end =
+        text.as_bytes()[last..].iter().position(|&byte| byte == b'\n').map_or(text.len(), |at| last + at);
     let lines = &text[start..end];
-    let mut instead: String =
-        lines.bytes().map(|byte| if byte == b'\n' { '\n' } else { ' ' }).collect();
+    let mut instead: String = lines.bytes().map(|byte| if byte == b'\n' { '\n' } else { ' ' }).collect();
     if lines.starts_with('[') && !lines.contains('\n') && lines.len() > 2 {
         instead = format!("[{number:_<width$}]", width = lines.len() - 2);
     }
@@ -88,30 +91,37 @@ fn in_our_words(message: &str, word: &str, line: &str) -> Mistake {
             "two entries or sections cannot have one name; join them, or rename one".to_owned(),
         ),
         "key with no value" => {
-            let rest = line.strip_prefix(word).map(str::trim).filter(|rest| rest.starts_with(['"', '[', '{', ':']));
+            let rest =
+                line.strip_prefix(word).map(str::trim).filter(|rest| rest.starts_with(['"', '[', '{', ':']));
             let help = match rest {
                 Some(rest) => format!("write {word} = {}", rest.trim_start_matches([':', ' '])),
-                None => "an entry is written as in name = \"exploration\", a section as in [agent.sonar]".to_owned(),
+                None => "an entry is written as in name = \"exploration\", a section as in [agent.sonar]"
+                    .to_owned(),
             };
             (format!("`{word}` has no value"), help)
         }
         "invalid basic string" | "invalid literal string" => {
             ("this text is not closed".to_owned(), "it needs a quote at its end, on the same line".to_owned())
         }
-        "unclosed table" => ("this heading is not closed".to_owned(), "it needs a \"]\" at its end".to_owned()),
+        "unclosed table" => {
+            ("this heading is not closed".to_owned(), "it needs a \"]\" at its end".to_owned())
+        }
         "unexpected key or value" => (
             format!("nothing can follow `{word}` on this line"),
             "every entry has a line of its own".to_owned(),
         ),
         "invalid unquoted key" => (
             format!("`{word}` is no name"),
-            "a name with other letters than a-z, A-Z, 0-9, - and _ needs quotes; a comment begins with #".to_owned(),
+            "a name with other letters than a-z, A-Z, 0-9, - and _ needs quotes; a comment begins with #"
+                .to_owned(),
         ),
         "unquoted keys cannot be empty" => ("here a name is missing".to_owned(), String::new()),
         "invalid mantissa" | "invalid fraction" => {
             ("this number needs digits on both sides of its point".to_owned(), "write 0.5, or 1.0".to_owned())
         }
-        first if first.starts_with("missing comma") => (format!("a comma is missing after `{word}`"), String::new()),
+        first if first.starts_with("missing comma") => {
+            (format!("a comma is missing after `{word}`"), String::new())
+        }
         first if first.starts_with("cannot extend value") => {
             (format!("`{word}` has a value already, it cannot be a section as well"), String::new())
         }

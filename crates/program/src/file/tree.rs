@@ -93,7 +93,9 @@ impl Reader<'_> {
             },
             DeValue::Array(list) => Value::List(list.iter().map(|item| self.entry(item)).collect()),
             DeValue::Table(table) => Value::Table(self.table(table)),
-            DeValue::Datetime(_) => self.bad(at, "a date means nothing here; a time is a text such as \"30s\""),
+            DeValue::Datetime(_) => {
+                self.bad(at, "a date means nothing here; a time is a text such as \"30s\"")
+            }
         };
         Entry { value, at }
     }

@@ -6,9 +6,6 @@ use types::{Category, Filter, Priority};
 
 use super::read::{Reader, unknown};
 
-
-
-
 /// An output and its inputs as they are written, to be judged when all agents are known.
 pub(super) struct Written {
     prefix: String,
@@ -78,7 +75,13 @@ impl Reader<'_> {
         wire.filter = Filter {
             every: whole(&mut r, "every", 0, u32::MAX.into()).unwrap_or(0) as u32,
             marker: whole(&mut r, "marker", 0, u32::MAX.into()).map(|n| n as u32),
-            category: word(&mut r, "category", "category", &Category::ALL.map(Category::name), Category::named),
+            category: word(
+                &mut r,
+                "category",
+                "category",
+                &Category::ALL.map(Category::name),
+                Category::named,
+            ),
             ..Filter::ALL
         };
         if let Some(least) =

@@ -226,7 +226,8 @@ mod tests {
         let mut text = String::new();
         let _ = writeln!(text, "name = \"lesson\"\nworld = \"laboratory\"\n");
         let _ = writeln!(text, "[agent.sonar]\nis = \"sonar\"\nperiod = \"250ms\"\non = \"echoes\"\n");
-        let _ = writeln!(text, "[wires]\n\"sonar.raw\" = [\"safety.raw\", {{ to = \"wall.raw\", depth = 8 }}]");
+        let _ =
+            writeln!(text, "[wires]\n\"sonar.raw\" = [\"safety.raw\", {{ to = \"wall.raw\", depth = 8 }}]");
         assert_eq!(write_plan(&plan), text);
     }
 }

@@ -39,7 +39,12 @@ pub(super) fn ls(answer: &Json) -> String {
             text(&agent["restarts"]),
         ]
     }));
-    let mut out = format!("{} at {:.2} s\n{}", text(&answer["system"]), answer["time_s"].as_f64().unwrap_or(0.0), table(&lines, 6));
+    let mut out = format!(
+        "{} at {:.2} s\n{}",
+        text(&answer["system"]),
+        answer["time_s"].as_f64().unwrap_or(0.0),
+        table(&lines, 6)
+    );
     for agent in rows(answer, "agents").filter(|agent| !agent["last_death"].is_null()) {
         let _ = writeln!(out, "  {} died last: {}", text(&agent["name"]), text(&agent["last_death"]));
     }
@@ -54,8 +59,16 @@ pub(super) fn graph(answer: &Json) -> String {
         let _ = writeln!(out, "{name} ({}, {})", text(&agent["kind"]), text(&agent["executor"]));
         let own = |wire: &&Json| wire["from"].as_str().is_some_and(|from| runtime::owner(from) == name);
         for wire in rows(answer, "wires").filter(own) {
-            let mut line = format!("  {} → {}  {}, {} sent", text(&wire["from"]), text(&wire["to"]), text(&wire["message"]), text(&wire["sent"]));
-            for (key, word) in [("dropped", "dropped"), ("refused", "given back"), ("expired", "read too late")] {
+            let mut line = format!(
+                "  {} → {}  {}, {} sent",
+                text(&wire["from"]),
+                text(&wire["to"]),
+                text(&wire["message"]),
+                text(&wire["sent"])
+            );
+            for (key, word) in
+                [("dropped", "dropped"), ("refused", "given back"), ("expired", "read too late")]
+            {
                 if wire[key].as_u64().is_some_and(|count| count > 0) {
                     let _ = write!(line, ", {} {word}", wire[key]);
                 }
@@ -69,9 +82,15 @@ pub(super) fn graph(answer: &Json) -> String {
 /// The graph for Graphviz.
 pub(super) fn dot(answer: &Json) -> String {
     let quoted = |json: &Json| format!("\"{}\"", text(json).replace('"', "\\\""));
-    let mut out = format!("digraph {} {{\n  rankdir = LR;\n  node [shape = box];\n", quoted(&answer["system"]));
+    let mut out =
+        format!("digraph {} {{\n  rankdir = LR;\n  node [shape = box];\n", quoted(&answer["system"]));
     for agent in rows(answer, "agents") {
-        let _ = writeln!(out, "  {} [label = {}];", quoted(&agent["name"]), quoted(&format!("{}\n{}", text(&agent["name"]), text(&agent["kind"])).into()));
+        let _ = writeln!(
+            out,
+            "  {} [label = {}];",
+            quoted(&agent["name"]),
+            quoted(&format!("{}\n{}", text(&agent["name"]), text(&agent["kind"])).into())
+        );
     }
     for wire in rows(answer, "wires") {
         let (from, to) = (text(&wire["from"]), text(&wire["to"]));
@@ -91,7 +110,20 @@ pub(super) fn dot(answer: &Json) -> String {
 
 /// Timing of the agents.
 pub(super) fn top(answer: &Json) -> String {
-    let head = ["agent", "state", "granted", "steps", "missed", "skipped", "restarts", "exec p50", "p99", "max", "jitter p99", "max"];
+    let head = [
+        "agent",
+        "state",
+        "granted",
+        "steps",
+        "missed",
+        "skipped",
+        "restarts",
+        "exec p50",
+        "p99",
+        "max",
+        "jitter p99",
+        "max",
+    ];
     let mut lines = vec![head.map(str::to_owned)];
     let figure = |agent: &Json, of: &str, key: &str| agent[of][key].as_f64().map_or("-".to_owned(), span);
     lines.extend(rows(answer, "agents").map(|agent| {

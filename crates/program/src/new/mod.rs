@@ -69,12 +69,17 @@ fn dependency(home: &Path) -> String {
 fn write(home: &Path, files: Vec<(String, String)>) -> Result<Vec<PathBuf>, Failure> {
     let paths: Vec<PathBuf> = files.iter().map(|(file, _)| home.join(file)).collect();
     if let Some(there) = paths.iter().find(|path| path.symlink_metadata().is_ok()) {
-        return Err(Failure::new(format!("{} is there already, and nothing is overwritten", there.display()))
-            .help("take another name, or move it away"));
+        return Err(Failure::new(format!(
+            "{} is there already, and nothing is overwritten",
+            there.display()
+        ))
+        .help("take another name, or move it away"));
     }
     for (path, (_, text)) in paths.iter().zip(&files) {
         let written = path.parent().map_or(Ok(()), fs::create_dir_all).and_then(|()| fresh(path, text));
-        written.map_err(|error| Failure::new(format!("{} cannot be written: {error}", path.display())).code(1))?;
+        written.map_err(|error| {
+            Failure::new(format!("{} cannot be written: {error}", path.display())).code(1)
+        })?;
     }
     Ok(paths)
 }

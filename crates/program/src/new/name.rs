@@ -4,10 +4,10 @@ use crate::error::Failure;
 
 /// Words that Rust keeps for itself, and crates that a new one would hide.
 const TAKEN: [&str; 48] = [
-    "abstract", "alloc", "as", "async", "await", "become", "box", "break", "const", "continue", "core", "crate", "do", "dyn",
-    "else", "enum", "extern", "false", "final", "fn", "for", "gen", "if", "impl", "in", "let", "loop", "macro", "main",
-    "match", "mod", "move", "mut", "override", "priv", "pub", "ref", "return", "self", "sinew", "static", "std", "struct",
-    "super", "test", "trait", "use", "while",
+    "abstract", "alloc", "as", "async", "await", "become", "box", "break", "const", "continue", "core",
+    "crate", "do", "dyn", "else", "enum", "extern", "false", "final", "fn", "for", "gen", "if", "impl", "in",
+    "let", "loop", "macro", "main", "match", "mod", "move", "mut", "override", "priv", "pub", "ref",
+    "return", "self", "sinew", "static", "std", "struct", "super", "test", "trait", "use", "while",
 ];
 
 /// The longest name that fits into a message.
@@ -100,7 +100,18 @@ mod tests {
 
     #[test]
     fn what_would_not_build_is_refused() {
-        for name in ["", "7up", "wall-7", "a b", "käse", "loop", "Sinew", "sonar", "../x", "a-name-of-far-too-many-letters"] {
+        for name in [
+            "",
+            "7up",
+            "wall-7",
+            "a b",
+            "käse",
+            "loop",
+            "Sinew",
+            "sonar",
+            "../x",
+            "a-name-of-far-too-many-letters",
+        ] {
             let said = Name::read(name).unwrap_err().problems[0].what.clone();
             assert!(said.contains("cannot be the name"), "{name}: {said}");
         }

@@ -66,7 +66,8 @@ pub(crate) const PLAYED: &str = "the recording is over";
 
 impl Judge {
     pub(crate) fn new(ready: &Ready, asked_to_end: Arc<AtomicBool>, facts: Option<Facts>) -> Judge {
-        let recorded = ready.robots.iter().filter(|robot| robot.description.clock == hardware::ClockKind::Recorded);
+        let recorded =
+            ready.robots.iter().filter(|robot| robot.description.clock == hardware::ClockKind::Recorded);
         let people = ready.truth.iter().flat_map(|truth| truth.plan().people.iter());
         Judge {
             people: people.map(|person| person.name.clone()).collect(),

@@ -30,10 +30,11 @@ use crate::cli::{ClockChoice, RunArgs, Speed};
 use crate::error::Failure;
 use crate::{figures, file, terminal};
 
-pub(crate) use judge::WORLD;
+pub(crate) use judge::{Facts, Judge, WORLD};
 pub(crate) use prepare::{ROBOT_KIND, Ready, Scenario};
+pub(crate) use recorder::{LogFile, choice};
 pub(crate) use sampler::Samples;
-pub(crate) use summary::{Summary, agent_table, figure_json, span, table};
+pub(crate) use summary::{Summary, failure, figure_json, span, table};
 
 /// How long a simulated system without a goal runs when nobody says: long enough to see what it does.
 const WITHOUT_GOAL: Duration = Duration::secs(60);
@@ -54,7 +55,8 @@ pub(crate) fn run(args: &RunArgs, registry: Registry, json: bool) -> Result<Exit
     let clock = options::clock(args, &ready)?;
     let watched = !json && terminal::watched();
     let place = Place::of(args, &scenario.file.plan.name, args.seed)?;
-    let whole = One { args, scenario: &scenario, seed: args.seed, clock, watched, place, asked_to_end, serves: true };
+    let whole =
+        One { args, scenario: &scenario, seed: args.seed, clock, watched, place, asked_to_end, serves: true };
     let summary = whole.run(ready)?;
     if json {
         terminal::say_json(&summary.to_json());
@@ -136,7 +138,11 @@ impl One<'_> {
         let options = Options {
             limit: self.limit(&ready),
             speed: self.speed(),
-            log: if recorder.is_some() { recorder::choice(&ready, self.args.images) } else { Default::default() },
+            log: if recorder.is_some() {
+                recorder::choice(&ready, self.args.images)
+            } else {
+                Default::default()
+            },
             recorder,
             observer: Box::new(judge),
             parse: control::words::parse,
@@ -145,11 +151,14 @@ impl One<'_> {
         let mut summary = Summary::new(&ready, self.seed, clock_name(self.clock), report);
         summary.images = self.args.images;
         summary.log = outcome.map(|outcome| outcome.lock().unwrap_or_else(PoisonError::into_inner).clone());
-        self.write_files(&ready, &mut summary, samples);
+        self.write_files(&mut summary, samples);
         Ok(summary)
     }
 
-    fn log(&self, ready: &Ready) -> Result<Option<(recorder::LogFile, judge::Facts, recorder::SharedOutcome)>, Failure> {
+    fn log(
+        &self,
+        ready: &Ready,
+    ) -> Result<Option<(recorder::LogFile, judge::Facts, recorder::SharedOutcome)>, Failure> {
         let Some(path) = self.place.as_ref().and_then(|place| place.log.as_ref()) else { return Ok(None) };
         let run = RunInfo {
             system: ready.plan.name.clone(),
@@ -163,14 +172,17 @@ impl One<'_> {
         };
         let facts = judge::Facts::default();
         let (file, outcome) = recorder::LogFile::create(path, &run, self.args.images, facts.clone())
-            .map_err(|error| Failure::new(error.to_string()).help("--log names another file, --no-log writes none"))?;
+            .map_err(|error| {
+                Failure::new(error.to_string()).help("--log names another file, --no-log writes none")
+            })?;
         Ok(Some((file, facts, outcome)))
     }
 
     fn limit(&self, ready: &Ready) -> Option<Duration> {
         // The judge ends a run whose goal can no longer be met in time; the limit stands behind it.
         let of_goal = ready.goal.as_ref().map(|goal| goal.within + Duration::secs(1));
-        let recorded = ready.robots.iter().any(|robot| robot.description.clock == hardware::ClockKind::Recorded);
+        let recorded =
+            ready.robots.iter().any(|robot| robot.description.clock == hardware::ClockKind::Recorded);
         let usual = (self.clock == ClockChoice::Sim && !recorded).then_some(WITHOUT_GOAL);
         self.args.limit.or(of_goal).or(usual)
     }
@@ -205,18 +217,20 @@ impl One<'_> {
 
     fn beside(&self, ready: &Ready, control: Control) -> Result<Beside, Failure> {
         Ok(Beside {
-            server: if self.serves { serve::start(ready, &control, &self.asked_to_end) } else { None },
+            server: if self.serves { serve::start(ready, &control) } else { None },
             screen: if self.watched { Some(screen::Screen::start(ready, control.clone())?) } else { None },
             sampler: if self.place.is_some() { sampler::Sampler::start(control) } else { None },
         })
     }
 
-    fn write_files(&self, ready: &Ready, summary: &mut Summary, samples: sampler::Samples) {
+    fn write_files(&self, summary: &mut Summary, samples: sampler::Samples) {
         let Some(place) = &self.place else { return };
         let timing = place.folder.join("timing.json");
         match std::fs::write(&timing, sampler::to_json(summary, &samples).to_string()) {
             Ok(()) => summary.files.push(timing),
-            Err(error) => terminal::tell(&format!("warning: {} cannot be written: {error}", timing.display())),
+            Err(error) => {
+                terminal::tell(&format!("warning: {} cannot be written: {error}", timing.display()))
+            }
         }
         let Some(log) = &place.log else { return };
         if log.is_file() {
@@ -227,7 +241,6 @@ impl One<'_> {
             Ok(files) => summary.files.extend(files),
             Err(error) => terminal::tell(&format!("warning: no figures: {error}")),
         }
-        let _ = ready;
     }
 }
 
@@ -258,5 +271,70 @@ fn clock_name(clock: ClockChoice) -> &'static str {
     match clock {
         ClockChoice::Sim => "sim",
         ClockChoice::Wall => "wall",
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use record::log::Reader;
+
+    /// Ten seconds of the scenario with a log; gives the log's bytes.
+    fn log_of(seed: u64, folder: &Path) -> Vec<u8> {
+        let registry = with_robots(agents::registry());
+        let scenario = Scenario { file: file::load("exploration", &[], &registry).unwrap(), registry };
+        let ready = scenario.prepare(seed).unwrap();
+        let path = folder.join(format!("{seed}.mcap"));
+        let facts = Facts::default();
+        let run = RunInfo { notes: figures::notes(&ready), seed: Some(seed), ..RunInfo::default() };
+        let (log, _) = LogFile::create(&path, &run, 1.0, facts.clone()).unwrap();
+        let options = Options {
+            limit: Some(Duration::secs(10)),
+            log: choice(&ready, 1.0),
+            recorder: Some(Box::new(log)),
+            observer: Box::new(Judge::new(&ready, Arc::default(), Some(facts))),
+            parse: control::words::parse,
+            ..Options::default()
+        };
+        Simulation::new(&ready.plan, &ready.registry, options).unwrap().run().unwrap();
+        std::fs::read(path).unwrap()
+    }
+
+    #[test]
+    fn the_same_seed_gives_the_same_log_with_pictures_truth_and_frame_tree_in_it() {
+        let folder = std::env::temp_dir().join(format!("sinew-run-{}", std::process::id()));
+        std::fs::create_dir_all(&folder).unwrap();
+        let first = log_of(7, &folder);
+        assert_eq!(first, log_of(7, &folder), "same plan and seed, same bytes");
+        assert_ne!(first, log_of(8, &folder), "another seed is another run");
+        let mut reader = Reader::open(folder.join("7.mcap")).unwrap();
+        let mut counts = std::collections::BTreeMap::new();
+        let mut last = types::Time::ZERO;
+        while let Some(message) = reader.next_message().unwrap() {
+            *counts.entry(message.channel.topic.clone()).or_insert(0) += 1;
+            if message.channel.topic == "/truth/h1" {
+                assert!(message.time >= last, "the truth is in order");
+                last = message.time;
+            }
+        }
+        std::fs::remove_dir_all(&folder).unwrap();
+        assert!((10..=11).contains(&counts["/h1/image/compressed"]), "one a second: {counts:?}");
+        assert!((99..=101).contains(&counts["/truth/h1"]), "ten a second: {counts:?}");
+        assert!(
+            (109..=113).contains(&counts["/tf"]),
+            "the mounts each second, the body ten times: {counts:?}"
+        );
+        assert_eq!(counts["/sonar/filtered"], 41);
+        assert!(!counts.contains_key("/h1/image"));
+    }
+
+    #[test]
+    fn a_plan_is_the_files_again_without_the_gates() {
+        let registry = with_robots(agents::registry());
+        let loaded = file::load("exploration", &[], &registry).unwrap();
+        let scenario = Scenario { file: loaded.clone(), registry };
+        let ready = scenario.prepare(1).unwrap();
+        assert_eq!(ready.plan.agents[0].kind, "robot h1");
+        assert_eq!(plan_of_file(ready.plan), loaded.plan);
     }
 }

@@ -4,13 +4,14 @@ use std::io;
 use std::path::{Path, PathBuf};
 
 use hardware::{carmen, ticks};
-use runtime::Registry;
+use record::log::Reader;
+use runtime::{Plan, Registry};
 use types::value::Value;
 
 use super::prepare::{Ready, Scenario};
 use crate::cli::{ClockChoice, RunArgs};
 use crate::error::Failure;
-use crate::file;
+use crate::{figures, file};
 
 /// Reads the system file, with the changes that the command line makes to it.
 pub(super) fn scenario(args: &RunArgs, registry: Registry) -> Result<Scenario, Failure> {
@@ -19,9 +20,18 @@ pub(super) fn scenario(args: &RunArgs, registry: Registry) -> Result<Scenario, F
         let (driver, folder) = recording(from)?;
         let robots = loaded.plan.section("robot").map(|robots| robots.rows()).unwrap_or_default();
         let [robot] = robots else {
-            return Err(Failure::new(format!("--from gives one robot its recording, and the plan has {}", robots.len()))
-                .help("say it in the plan, as in driver = \"carmen:FILE\""));
+            return Err(Failure::new(format!(
+                "--from gives one robot its recording, and the plan has {}",
+                robots.len()
+            ))
+            .help("say it in the plan, as in driver = \"carmen:FILE\""));
         };
+        let name = robot.key.clone();
+        if let Some(recorded) = recorded_robot(from).filter(|recorded| *recorded != name) {
+            rename(&mut loaded.plan, &name, &recorded);
+        }
+        let robots = loaded.plan.section("robot").map(|robots| robots.rows()).unwrap_or_default();
+        let [robot] = robots else { return Err(Failure::new("the plan has no robot")) };
         let path = format!("robot.{}.driver", types::value::Key(&robot.key));
         let set = loaded.plan.sections.set_path(&path, Value::Text(driver));
         set.map_err(|mistake| Failure::new(mistake.what))?;
@@ -64,6 +74,37 @@ fn recording(path: &Path) -> Result<(String, PathBuf), Failure> {
         .help("logs of our own end in .mcap"))
 }
 
+/// The only robot of a log of our own: the plan's takes its name, under which its messages are.
+fn recorded_robot(path: &Path) -> Option<String> {
+    let reader = Reader::open(path).ok()?;
+    let mut robots = figures::robots(&reader.run()?.notes);
+    if robots.len() == 1 { robots.pop() } else { None }
+}
+
+/// Gives a robot of a plan another name.
+fn rename(plan: &mut Plan, from: &str, to: &str) {
+    let port = |name: &mut String| {
+        if let Some(port) = name.strip_prefix(from).filter(|rest| rest.starts_with('.')) {
+            *name = format!("{to}{port}");
+        }
+    };
+    for agent in &mut plan.agents {
+        if agent.name == from {
+            agent.name = to.to_owned();
+        }
+        if agent.robot.as_deref() == Some(from) {
+            agent.robot = Some(to.to_owned());
+        }
+    }
+    for wire in &mut plan.wires {
+        port(&mut wire.from);
+        port(&mut wire.to);
+    }
+    if let Some(Value::Table(robots)) = plan.sections.get_mut("robot").map(|entry| &mut entry.value) {
+        robots.rows_mut().iter_mut().filter(|row| row.key == from).for_each(|row| row.key = to.to_owned());
+    }
+}
+
 /// The clock that was asked for, or the one that fits the robots.
 pub(super) fn clock(args: &RunArgs, ready: &Ready) -> Result<ClockChoice, Failure> {
     match args.clock {
@@ -76,5 +117,21 @@ pub(super) fn clock(args: &RunArgs, ready: &Ready) -> Result<ClockChoice, Failur
         Some(clock) => Ok(clock),
         None if ready.needs_wall => Ok(ClockChoice::Wall),
         None => Ok(ClockChoice::Sim),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_robot_of_another_name_is_wired_as_before() {
+        let registry = crate::run::with_robots(agents::registry());
+        let mut plan = file::load(RECORDED, &[], &registry).unwrap().plan;
+        rename(&mut plan, "r1", "h1");
+        assert_eq!(runtime::check(&plan, &registry), []);
+        assert!(plan.wires.iter().any(|wire| wire.from == "h1.pose"));
+        assert!(plan.agents.iter().all(|agent| agent.name != "r1" && agent.robot.as_deref() != Some("r1")));
+        assert!(plan.section("robot").unwrap().get("h1").is_some());
     }
 }

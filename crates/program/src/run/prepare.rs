@@ -9,7 +9,6 @@ use hardware::simulated::{self, Truth};
 use hardware::{Berth, ClockKind, Gate, Latch, RobotDescription, Spec};
 use runtime::{Params as _, Plan, Registry};
 use sim::{Drawn, Goal, Model, Vary, WorldPlan};
-use types::Duration;
 use types::value::{Mistake, Row, Span, Table};
 
 use crate::error::Failure;
@@ -172,7 +171,8 @@ impl Scenario {
         let mut mistakes = Vec::new();
         let mut robots = Table::new();
         rows.iter().for_each(|row| robots.push((*row).clone()));
-        let of_world = world.get("vary").and_then(|entry| entry.value.as_table()).cloned().unwrap_or_default();
+        let of_world =
+            world.get("vary").and_then(|entry| entry.value.as_table()).cloned().unwrap_or_default();
         let of_world = Vary::read(&of_world, &mut mistakes);
         let own = Vary::read(&self.table("vary"), &mut mistakes);
         let (Some(of_world), Some(own)) = (of_world, own) else { return Err(self.wrong(mistakes)) };
@@ -202,11 +202,6 @@ impl Ready {
         if let Some(agent) = self.plan.agent_mut(&row.key) {
             agent.kind = kind.to_owned();
         }
-    }
-
-    /// How long the run may last by its own goal.
-    pub(crate) fn within(&self) -> Option<Duration> {
-        self.goal.as_ref().map(|goal| goal.within)
     }
 }
 

@@ -10,7 +10,7 @@ use runtime::{LogChoice, Recorder};
 use types::cdr::{self, NoElement};
 use types::definition::Definition;
 use types::message::{Message, describe};
-use types::messages::{Image, Odometry};
+use types::messages::{FrameTransform, Image, Odometry, Transforms};
 use types::{Duration, Header, Time};
 
 use super::judge::Facts;
@@ -38,11 +38,14 @@ pub(crate) type SharedOutcome = Arc<Mutex<LogOutcome>>;
 pub(crate) struct LogFile {
     writer: Option<Writer>,
     channels: HashMap<String, ChannelId>,
+    kinds: HashMap<String, Kind>,
     pictures: HashMap<String, Pictures>,
     /// The least time between two pictures of an output.
     picture_gap: Duration,
     facts: Facts,
     fact_numbers: HashMap<String, u64>,
+    /// When the next place of each body goes to the frame tree.
+    places: HashMap<String, Time>,
     scratch: cdr::Writer,
     outcome: SharedOutcome,
 }
@@ -53,20 +56,57 @@ struct Pictures {
     next: Time,
 }
 
+/// What is done with the messages of a topic.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+enum Kind {
+    /// Packed, and not each.
+    Picture,
+    /// To the topic where viewers look for the frame tree.
+    Tree,
+    /// Also to the frame tree.
+    Place,
+    /// As it is.
+    #[default]
+    Other,
+}
+
+impl Kind {
+    fn of(definition: &str) -> Kind {
+        match definition {
+            IMAGE => Kind::Picture,
+            Transforms::NAME => Kind::Tree,
+            Odometry::NAME => Kind::Place,
+            _ => Kind::Other,
+        }
+    }
+}
+
+/// Where viewers look for the frame tree.
+const TREE: &str = "/tf";
+/// The least time between two places of a body in the frame tree: smooth to the eye.
+const PLACES: Duration = Duration::millis(100);
+
 /// The name of the messages of cameras.
 const IMAGE: &str = Image::NAME;
 
 impl LogFile {
     /// Begins a log. `images` is how many pictures a second are kept of each output.
-    pub(crate) fn create(path: &Path, run: &RunInfo, images: f64, facts: Facts) -> Result<(LogFile, SharedOutcome), WriteError> {
+    pub(crate) fn create(
+        path: &Path,
+        run: &RunInfo,
+        images: f64,
+        facts: Facts,
+    ) -> Result<(LogFile, SharedOutcome), WriteError> {
         let outcome = SharedOutcome::default();
         let file = LogFile {
             writer: Some(Writer::create(path, run)?),
             channels: HashMap::new(),
+            kinds: HashMap::new(),
             pictures: HashMap::new(),
             picture_gap: if images > 0.0 { Duration::from_seconds(1.0 / images) } else { Duration(i64::MAX) },
             facts,
             fact_numbers: HashMap::new(),
+            places: HashMap::new(),
             scratch: cdr::Writer::new(),
             outcome: outcome.clone(),
         };
@@ -105,7 +145,9 @@ impl LogFile {
 
     fn write(&mut self, topic: &str, definition: &dyn Fn() -> Definition, header: &Header, cdr: &[u8]) {
         let Some(channel) = self.channel(topic, definition) else { return };
-        if let Some(Err(error)) = self.writer.as_mut().map(|out| out.write(channel, header, header.stamp, cdr)) {
+        if let Some(Err(error)) =
+            self.writer.as_mut().map(|out| out.write(channel, header, header.stamp, cdr))
+        {
             self.failed(error);
         }
     }
@@ -123,6 +165,25 @@ impl LogFile {
             self.write(&topic, &describe::<Odometry>, &header, scratch.bytes());
             self.scratch = scratch;
         }
+    }
+
+    /// Where odometry puts the body, for viewers that draw by the frame tree.
+    fn write_place(&mut self, output: &str, header: &Header, cdr: &[u8]) {
+        let stamp = header.stamp;
+        if self.places.get(output).is_some_and(|next| stamp < *next) {
+            return;
+        }
+        let decoded =
+            cdr::Reader::new(cdr).and_then(|mut reader| Odometry::decode(&mut reader, &mut Vec::new()));
+        let Ok(Odometry { frame, body, pose, .. }) = decoded else { return };
+        self.places.insert(output.to_owned(), stamp + PLACES);
+        let edge = FrameTransform { parent: frame, child: body, pose, z: 0.0 };
+        let tree = Transforms { edges: [edge].into_iter().collect() };
+        let mut scratch = std::mem::take(&mut self.scratch);
+        scratch.clear();
+        tree.encode(&[] as &[NoElement], stamp, &mut scratch);
+        self.write(TREE, &describe::<Transforms>, header, scratch.bytes());
+        self.scratch = scratch;
     }
 
     fn write_picture(&mut self, topic: &str, header: &Header, cdr: &[u8]) {
@@ -161,16 +222,20 @@ fn packed(cdr: &[u8], stamp: Time) -> Result<Vec<u8>, String> {
 impl Recorder for LogFile {
     fn message(&mut self, topic: &str, definition: &dyn Fn() -> Definition, header: &Header, cdr: &[u8]) {
         self.write_facts(header.stamp);
+        let output = topic;
         let topic = topic_of(topic);
-        // The definition is made only once for a topic; to ask for its name is to make it.
-        let is_picture = match self.pictures.contains_key(&format!("{topic}/compressed")) {
-            true => true,
-            false => !self.channels.contains_key(&topic) && definition().name == IMAGE,
-        };
-        if is_picture {
-            self.write_picture(&topic, header, cdr);
-        } else {
-            self.write(&topic, definition, header, cdr);
+        // The definition of a topic is made when its first message comes, and not again.
+        if !self.kinds.contains_key(&topic) {
+            self.kinds.insert(topic.clone(), Kind::of(definition().name));
+        }
+        match self.kinds.get(&topic).copied().unwrap_or_default() {
+            Kind::Picture => self.write_picture(&topic, header, cdr),
+            Kind::Tree => self.write(TREE, definition, header, cdr),
+            Kind::Place => {
+                self.write(&topic, definition, header, cdr);
+                self.write_place(output, header, cdr);
+            }
+            Kind::Other => self.write(&topic, definition, header, cdr),
         }
     }
 

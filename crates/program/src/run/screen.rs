@@ -36,14 +36,18 @@ pub(super) struct Screen {
 impl Screen {
     pub(super) fn start(ready: &Ready, control: Control) -> Result<Screen, Failure> {
         let over = Arc::new(AtomicBool::new(false));
-        let decider = ready.plan.agents.iter().find(|agent| agent.kind == DECIDER).map(|agent| agent.name.clone());
+        let decider =
+            ready.plan.agents.iter().find(|agent| agent.kind == DECIDER).map(|agent| agent.name.clone());
         let robots = ready.robots.iter().map(|robot| robot.name.clone()).collect();
-        let view = View { name: ready.plan.name.clone(), truth: ready.truth.clone(), control, robots, decider };
+        let view =
+            View { name: ready.plan.name.clone(), truth: ready.truth.clone(), control, robots, decider };
         let mine = over.clone();
         let thread = std::thread::Builder::new()
             .name("sinew-screen".into())
             .spawn(move || view.keep_drawing(&mine))
-            .map_err(|error| Failure::new(format!("no thread could be started for the screen: {error}")).code(1))?;
+            .map_err(|error| {
+                Failure::new(format!("no thread could be started for the screen: {error}")).code(1)
+            })?;
         Ok(Screen { over, thread: Some(thread) })
     }
 }
@@ -83,7 +87,8 @@ impl View {
         }
         let sonars: Vec<Option<Tap>> =
             self.robots.iter().map(|robot| self.control.tap(&format!("{robot}.sonar")).ok()).collect();
-        let decisions = self.decider.as_ref().and_then(|decider| self.control.tap(&format!("{decider}.decision")).ok());
+        let decisions =
+            self.decider.as_ref().and_then(|decider| self.control.tap(&format!("{decider}.decision")).ok());
         let mut heard = Heard { echoes: vec![Vec::new(); self.robots.len()], ..Heard::default() };
         while !over.load(Ordering::Acquire) {
             if let Some(last) = decisions.as_ref().and_then(|tap| tap.take().0.pop()) {
@@ -130,13 +135,17 @@ impl View {
         }
         if let Some(truth) = &self.truth {
             for (_, robot) in truth.robots() {
-                first += &format!("   {:.2} m/s  closest {:.2} m  collisions {}", robot.truth.linear, robot.truth.closest, robot.truth.collisions);
+                first += &format!(
+                    "   {:.2} m/s  closest {:.2} m  collisions {}",
+                    robot.truth.linear, robot.truth.closest, robot.truth.collisions
+                );
             }
         }
         let goal = self.robots.first().and_then(|robot| self.truth.as_ref()?.why(robot)).unwrap_or_default();
         let fault = self.control.view().ok().and_then(|view| {
-            let died = view.agents.iter().filter_map(|agent| Some((agent, agent.last_death.as_ref()?)));
-            died.last().map(|(agent, why)| format!("last fault: {} {why} (now {})", agent.name, agent.state.name()))
+            let mut died = view.agents.iter().filter_map(|agent| Some((agent, agent.last_death.as_ref()?)));
+            died.next_back()
+                .map(|(agent, why)| format!("last fault: {} {why} (now {})", agent.name, agent.state.name()))
         });
         let cut = |text: String| text.chars().take(columns.saturating_sub(1)).collect::<String>();
         let on = coloured();
@@ -149,12 +158,17 @@ impl View {
 
 /// Where a firing of the ring saw something, seen from the robot.
 fn seen(bytes: &[u8]) -> Vec<Point> {
-    let Some(ring) = cdr::Reader::new(bytes).ok().and_then(|mut reader| Echoes::decode(&mut reader, &mut Vec::new()).ok()) else {
+    let Some(ring) =
+        cdr::Reader::new(bytes).ok().and_then(|mut reader| Echoes::decode(&mut reader, &mut Vec::new()).ok())
+    else {
         return Vec::new();
     };
     let near = ring.echoes.iter().filter(|echo| echo.range.is_finite() && echo.range < ring.range_max - 0.01);
-    near.map(|echo| Pose::new(echo.x.into(), echo.y.into(), echo.bearing.into()).transform(Point::new(echo.range.into(), 0.0)))
-        .collect()
+    near.map(|echo| {
+        Pose::new(echo.x.into(), echo.y.into(), echo.bearing.into())
+            .transform(Point::new(echo.range.into(), 0.0))
+    })
+    .collect()
 }
 
 /// Dots of the terminal's cells: two across and four down, as Braille has them.
@@ -194,7 +208,10 @@ impl Dots {
     }
 
     fn place(&self, point: Point) -> (f64, f64) {
-        ((point.x - self.low.x) * self.scale, (4 * self.rows) as f64 - 1.0 - (point.y - self.low.y) * self.scale)
+        (
+            (point.x - self.low.x) * self.scale,
+            (4 * self.rows) as f64 - 1.0 - (point.y - self.low.y) * self.scale,
+        )
     }
 
     fn cell(&self, x: f64, y: f64) -> Option<usize> {
@@ -305,14 +322,19 @@ mod tests {
     #[test]
     fn arrows_point_where_the_robot_looks() {
         let quarter = std::f64::consts::FRAC_PI_2;
-        assert_eq!([0.0, quarter, -quarter, 2.0 * quarter, -1.9 * quarter].map(arrow), ['→', '↑', '↓', '←', '←']);
+        assert_eq!(
+            [0.0, quarter, -quarter, 2.0 * quarter, -1.9 * quarter].map(arrow),
+            ['→', '↑', '↓', '←', '←']
+        );
     }
 
     #[test]
     fn a_wall_is_drawn_where_it_stands_and_upright() {
         let mut dots = Dots::new((Point::new(0.0, 0.0), Point::new(10.0, 5.0)), 41, 20);
         dots.line(Point::new(0.0, 5.0), Point::new(10.0, 5.0), WALL);
-        let used: Vec<usize> = (0..dots.rows).filter(|row| dots.cells[row * dots.columns..][..dots.columns].iter().any(|cell| cell.0 != 0)).collect();
+        let used: Vec<usize> = (0..dots.rows)
+            .filter(|row| dots.cells[row * dots.columns..][..dots.columns].iter().any(|cell| cell.0 != 0))
+            .collect();
         assert!(used.len() == 1 && used[0] <= 1, "the upper side is on top: {used:?}");
     }
 }

@@ -23,7 +23,8 @@ pub(super) fn run(
     json: bool,
 ) -> Result<ExitCode, Failure> {
     if args.log.is_some() {
-        return Err(Failure::new("--log names one file, and there are many runs").help("--out DIR gives each a folder of its own"));
+        return Err(Failure::new("--log names one file, and there are many runs")
+            .help("--out DIR gives each a folder of its own"));
     }
     let begun = terminal::host_now();
     let done = all(args, scenario, range, asked_to_end)?;
@@ -84,7 +85,12 @@ fn all(
     }
 }
 
-fn one(args: &RunArgs, scenario: &Scenario, seed: u64, asked_to_end: &Arc<AtomicBool>) -> Result<Summary, Failure> {
+fn one(
+    args: &RunArgs,
+    scenario: &Scenario,
+    seed: u64,
+    asked_to_end: &Arc<AtomicBool>,
+) -> Result<Summary, Failure> {
     let ready = scenario.prepare(seed)?;
     let clock = options::clock(args, &ready)?;
     let place = match &args.out {
@@ -96,8 +102,9 @@ fn one(args: &RunArgs, scenario: &Scenario, seed: u64, asked_to_end: &Arc<Atomic
 }
 
 fn text(name: &str, range: Seeds, done: &BTreeMap<u64, Summary>, took: f64) -> String {
-    let head = ["seed", "met", "time", "collisions", "closest", "distance", "why"].map(str::to_owned);
-    let number = |value: Option<f64>, unit: &str| value.map_or("-".to_owned(), |value| format!("{value:.2} {unit}"));
+    let head = ["seed", "met", "time", "collisions", "closest", "distance"].map(str::to_owned);
+    let number =
+        |value: Option<f64>, unit: &str| value.map_or("-".to_owned(), |value| format!("{value:.2} {unit}"));
     let row = |(seed, summary): (&u64, &Summary)| {
         let met = match summary.met {
             Some(true) => "yes",
@@ -111,15 +118,17 @@ fn text(name: &str, range: Seeds, done: &BTreeMap<u64, Summary>, took: f64) -> S
             summary.collisions().map_or("-".to_owned(), |n| n.to_string()),
             number(summary.closest(), "m"),
             number(summary.distance(), "m"),
-            summary.why.clone(),
         ]
     };
-    let rows: Vec<[String; 7]> = std::iter::once(head).chain(done.iter().map(row)).collect();
-    // Numbers stand right, the last column is a sentence.
+    let rows: Vec<[String; 6]> = std::iter::once(head).chain(done.iter().map(row)).collect();
+    // Numbers stand right, and behind them a sentence.
+    let sentences = std::iter::once("why").chain(done.values().map(|summary| summary.why.as_str()));
+    let lines = table(&rows, 0);
+    let mut out: String =
+        lines.lines().zip(sentences).map(|(line, why)| format!("{line}  {why}\n")).collect();
     let met = done.values().filter(|summary| summary.is_success()).count();
     let collided = done.values().filter(|summary| summary.collisions().is_some_and(|n| n > 0)).count();
     let count = range.last - range.first + 1;
-    let mut out = table(&rows, 0);
     out += &format!(
         "{name}: {met} of {} succeeded ({:.0} %), {collided} with collisions, in {took:.1} s\n",
         done.len(),

@@ -6,11 +6,12 @@ use std::sync::{Arc, Mutex, PoisonError};
 use std::thread::JoinHandle;
 use std::time::Duration as HostDuration;
 
+use control::words::Usage;
 use control::{Hooks, RunFolder, Server};
 use hardware::Latch;
 use hardware::latch::Cause;
 use record::{dynamic, schema::Schema};
-use runtime::{Control, Refusal};
+use runtime::{AgentPlan, Control, Overload, Plan, Refusal, Registry, WirePlan};
 use serde_json::{Value as Json, json};
 use types::definition::Definition;
 use types::message::Message as _;
@@ -34,7 +35,7 @@ const KEPT: usize = 256;
 const FETCH: HostDuration = HostDuration::from_millis(10);
 
 /// Opens the control interface. A run without it is still a run, so what goes wrong is told and no more.
-pub(super) fn start(ready: &Ready, control: &Control, _: &Arc<AtomicBool>) -> Option<Serving> {
+pub(super) fn start(ready: &Ready, control: &Control) -> Option<Serving> {
     let warn = |text: String| {
         terminal::tell(&format!("warning: {text}; nobody can control this run from outside"));
         None
@@ -44,12 +45,15 @@ pub(super) fn start(ready: &Ready, control: &Control, _: &Arc<AtomicBool>) -> Op
         Err(error) => return warn(error.to_string()),
     };
     let decisions = Arc::new(Mutex::new(VecDeque::new()));
-    let decider = ready.plan.agents.iter().find(|agent| agent.kind == DECIDER).map(|agent| agent.name.clone());
+    let decider =
+        ready.plan.agents.iter().find(|agent| agent.kind == DECIDER).map(|agent| agent.name.clone());
     let hooks = RunHooks {
         control: control.clone(),
         latches: ready.robots.iter().map(|robot| robot.latch.clone()).collect(),
         decisions: decisions.clone(),
         decides: decider.is_some(),
+        plan: ready.plan.clone(),
+        registry: ready.registry.clone(),
     };
     let server = match Server::start(&folder, &ready.plan.name, control.clone(), Arc::new(hooks)) {
         Ok(server) => server,
@@ -77,7 +81,12 @@ pub(super) const DECIDER: &str = "decision-maker";
 type Decisions = Arc<Mutex<VecDeque<(Time, Decision)>>>;
 
 /// Keeps the changes of the decision.
-fn listen(control: Control, decider: String, decisions: Decisions, over: Arc<AtomicBool>) -> Option<JoinHandle<()>> {
+fn listen(
+    control: Control,
+    decider: String,
+    decisions: Decisions,
+    over: Arc<AtomicBool>,
+) -> Option<JoinHandle<()>> {
     let work = move || {
         let Ok(tap) = control.tap(&format!("{decider}.decision")) else { return };
         while !over.load(Ordering::Acquire) {
@@ -114,11 +123,31 @@ struct RunHooks {
     latches: Vec<Latch>,
     decisions: Decisions,
     decides: bool,
+    /// The plan that was run, for what the runtime does not know.
+    plan: Plan,
+    registry: Registry,
 }
+
+/// What a run answers besides what every system does.
+const MORE: [Usage; 1] = [Usage { verb: "file", form: "file", does: "the running system as a system file" }];
 
 impl RunHooks {
     fn now(&self) -> Time {
         self.control.view().map_or(Time::ZERO, |view| view.now)
+    }
+
+    /// The plan as it is now. Wires that follow from the robot of an agent are not written: they come back by themselves.
+    fn running(&self) -> Result<Plan, Refusal> {
+        let (agents, wires) = self.control.plan()?;
+        let own = |agent: &AgentPlan| {
+            let (robot, kind) = (agent.robot.as_ref()?, self.registry.get(&agent.kind)?);
+            Some(runtime::robot_wires(agent, kind, robot))
+        };
+        let implied: Vec<_> = agents.iter().filter_map(own).flatten().collect();
+        let is_implied =
+            |wire: &WirePlan| implied.iter().any(|own| own.from == wire.from && own.to == wire.to);
+        let wires = wires.into_iter().filter(|wire| !is_implied(wire)).map(usual).collect();
+        Ok(Plan { agents, wires, ..self.plan.clone() })
     }
 
     fn robots(&self) -> Result<(), Refusal> {
@@ -145,12 +174,14 @@ impl Hooks for RunHooks {
 
     fn why(&self, n: usize) -> Result<Json, Refusal> {
         if !self.decides {
-            return Err(Refusal::new("nobody in this system decides").help("a decision maker has the type \"decision-maker\""));
+            return Err(Refusal::new("nobody in this system decides")
+                .help("a decision maker has the type \"decision-maker\""));
         }
         let decisions = self.decisions.lock().unwrap_or_else(PoisonError::into_inner);
         let last = decisions.iter().skip(decisions.len().saturating_sub(n));
         let rows = last.map(|(time, decision)| {
-            let weights = decision.rows.iter().map(|row| (row.agent.as_str().to_owned(), Json::from(row.weight)));
+            let weights =
+                decision.rows.iter().map(|row| (row.agent.as_str().to_owned(), Json::from(row.weight)));
             json!({
                 "time_s": time.seconds(),
                 "situation": decision.situation.as_str(),
@@ -170,12 +201,28 @@ impl Hooks for RunHooks {
         Ok(control::json::to_json(&value))
     }
 
+    fn more(&self) -> &[Usage] {
+        &MORE
+    }
+
+    fn command(&self, _: &[String]) -> Result<Json, Refusal> {
+        Ok(crate::file::write_plan(&super::plan_of_file(self.running()?)).into())
+    }
+
     fn encode(&self, definition: &Definition, message: &Json) -> Result<Vec<u8>, String> {
         let entry = Entry { value: control::json::from_json(message), at: Default::default() };
-        dynamic::encode(&schema(definition)?, &entry).map_err(|mistakes| {
-            mistakes.iter().map(ToString::to_string).collect::<Vec<_>>().join("; ")
-        })
+        dynamic::encode(&schema(definition)?, &entry)
+            .map_err(|mistakes| mistakes.iter().map(ToString::to_string).collect::<Vec<_>>().join("; "))
     }
+}
+
+/// A wire without what it would have anyway.
+fn usual(mut wire: WirePlan) -> WirePlan {
+    let has = |depth, overload| wire.depth == Some(depth) && wire.overload == Some(overload);
+    if has(runtime::USUAL_DEPTH, Overload::NewestWins) || has(runtime::USUAL_DEPTH_ON, Overload::Refuse) {
+        (wire.depth, wire.overload) = (None, None);
+    }
+    wire
 }
 
 /// Of a row with more values than this the rest is left out: nobody reads the pixels of a picture.

@@ -192,6 +192,9 @@ impl Summary {
         for robot in &self.robots {
             robot_lines(robot, self.robots.len() > 1).into_iter().for_each(&mut line);
         }
+        if self.robots.iter().any(|robot| robot.shadow) {
+            line(format!("               {}", self.wishes()));
+        }
         line(format!("  deadlines    {}", self.deadlines()));
         line(format!("  messages     {}", self.messages()));
         for text in self.told() {
@@ -204,12 +207,23 @@ impl Summary {
         line(agent_table(&self.agents));
         if let Some(log) = &self.log {
             line(format!("  log          {}", self.log_line(log)));
-            log.errors.iter().for_each(|error| line(format!("  log          {}", paint(coloured, "1;31", error))));
+            log.errors
+                .iter()
+                .for_each(|error| line(format!("  log          {}", paint(coloured, "1;31", error))));
         }
         for (i, file) in self.files.iter().enumerate() {
             line(format!("  {:<12} {}", if i == 0 { "files" } else { "" }, file.display()));
         }
         out
+    }
+
+    /// Who wished to drive how often.
+    fn wishes(&self) -> String {
+        let wishes = |agent: &AgentView| {
+            let port = agent.ports.iter().find(|port| port.name == "drive" && port.message == "Offer")?;
+            Some(format!("{} wished {} times", agent.name, port.sent))
+        };
+        self.agents.iter().filter_map(wishes).collect::<Vec<_>>().join(", ")
     }
 
     fn times(&self) -> String {
@@ -225,7 +239,8 @@ impl Summary {
     }
 
     fn deadlines(&self) -> String {
-        let (of, missed) = (self.count(|agent| agent.counts.releases), self.count(|agent| agent.counts.missed));
+        let (of, missed) =
+            (self.count(|agent| agent.counts.releases), self.count(|agent| agent.counts.missed));
         let stalled = self.count(|agent| agent.counts.stalled);
         let mut text = format!("{missed} of {of} missed");
         if stalled > 0 {
@@ -251,14 +266,12 @@ impl Summary {
                 continue;
             }
             let at = (incident.time - self.begun).seconds();
-            let mut text = match incident.agent.as_str() {
-                "plan" => format!("at {} the plan {}", seconds(at), incident.what),
-                agent => format!("at {} {agent} {}", seconds(at), incident.what),
-            };
-            let again = (i + 1..self.incidents.len()).find(|later| self.incidents[*later].agent == incident.agent);
+            let mut text = happened(incident, &seconds(at));
+            let again =
+                (i + 1..self.incidents.len()).find(|later| self.incidents[*later].agent == incident.agent);
             if let Some(later) = again.filter(|later| self.incidents[*later].what == STARTED_AGAIN) {
                 let after = (self.incidents[later].time - incident.time).seconds();
-                text += &format!("; started again {after:.1} s later");
+                text += &format!(", started again {after:.1} s later");
                 done[later] = true;
             }
             told.push(text);
@@ -271,7 +284,8 @@ impl Summary {
         if self.clock != "wall" {
             return None;
         }
-        let refused: Vec<&AgentView> = self.agents.iter().filter(|agent| agent.asked != agent.granted).collect();
+        let refused: Vec<&AgentView> =
+            self.agents.iter().filter(|agent| agent.asked != agent.granted).collect();
         let first = refused.first()?;
         Some(format!(
             "{} of {} agents did not get what they asked for ({}: asked {}, granted {}); \"sinew doctor\" says why",
@@ -295,6 +309,22 @@ impl Summary {
             text += &format!(", {lost} messages lost");
         }
         text
+    }
+}
+
+/// An incident in a sentence.
+fn happened(incident: &Incident, at: &str) -> String {
+    let Incident { agent, what, .. } = incident;
+    if agent == "plan" {
+        return format!(
+            "the plan {} at {at}",
+            what.replacen("asked: ", "asked for \"", 1).replacen("; refused", "\"; refused", 1)
+                + if what.contains("; refused") { "" } else { "\"" }
+        );
+    }
+    match what.strip_prefix("panic: ") {
+        Some(why) => format!("{agent} panicked at {at} ({})", why.split(" (").next().unwrap_or(why)),
+        None => format!("{agent} {what} at {at}"),
     }
 }
 
@@ -331,7 +361,10 @@ fn robot_lines(robot: &RobotOutcome, several: bool) -> Vec<String> {
         }
     }
     if robot.stale > 0 && !robot.shadow {
-        lines.push(format!("  gate         {who}stood {} times because no new command came in time", robot.stale));
+        lines.push(format!(
+            "  gate         {who}stood {} times because no new command came in time",
+            robot.stale
+        ));
     }
     if robot.latched {
         lines.push(format!("  latch        {who}set: the robot stands until it is reset"));
@@ -396,7 +429,8 @@ fn robot_json(robot: &RobotOutcome) -> Json {
 /// One line an agent: what it asked for and got, and how it did.
 pub(crate) fn agent_table(agents: &[AgentView]) -> String {
     let mut rows = vec![
-        ["agent", "asked", "granted", "releases", "missed", "restarts", "exec p50", "exec max"].map(str::to_owned),
+        ["agent", "asked", "granted", "releases", "missed", "restarts", "exec p50", "exec max"]
+            .map(str::to_owned),
     ];
     for agent in agents {
         rows.push([

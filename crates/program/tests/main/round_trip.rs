@@ -21,7 +21,9 @@ fn bare(mut plan: Plan) -> Plan {
 
 fn again(plan: &Plan) -> Plan {
     let text = write_plan(plan);
-    bare(read_plan(&text, "written.toml", &registry()).unwrap_or_else(|mistakes| panic!("{mistakes}\n{text}")))
+    bare(
+        read_plan(&text, "written.toml", &registry()).unwrap_or_else(|mistakes| panic!("{mistakes}\n{text}")),
+    )
 }
 
 #[test]
@@ -46,11 +48,15 @@ fn what_the_file_says_is_in_the_plan() {
         decide.danger.near = { safety = 1.0 }
         at = [{ time = "40s", do = ["fault", "h1.sonar", "off"] }]
     "#;
-    let plan = read_plan(text, "some/lesson.toml", &registry()).unwrap_or_else(|mistakes| panic!("{mistakes}"));
+    let plan =
+        read_plan(text, "some/lesson.toml", &registry()).unwrap_or_else(|mistakes| panic!("{mistakes}"));
     assert_eq!(plan.name, "lesson");
     let safety = plan.agent("safety").unwrap();
     assert_eq!((safety.kind.as_str(), safety.deadline), ("safety-monitor", Some(Duration::millis(5))));
-    assert_eq!((safety.on.as_slice(), safety.executor.as_deref()), (&["ranges".to_owned()][..], Some("reflex")));
+    assert_eq!(
+        (safety.on.as_slice(), safety.executor.as_deref()),
+        (&["ranges".to_owned()][..], Some("reflex"))
+    );
     assert_eq!(safety.params.get("stop_distance").unwrap().value, Value::Float(0.3));
     let robot = plan.agent("h1").unwrap();
     assert_eq!((robot.kind.as_str(), robot.executor.as_deref()), ("robot", Some("gate")));
@@ -88,8 +94,12 @@ fn a_group_brings_its_agents_under_its_name() {
     assert_eq!(names, ["h1", "body.eyes.sonar", "body.safety", "wall"]);
     let eyes = loaded.plan.agent("body.eyes.sonar").unwrap();
     assert_eq!((eyes.robot.as_deref(), eyes.deadline), (Some("h1"), Some(Duration::millis(9))));
-    let wires: Vec<String> = loaded.plan.wires.iter().map(|wire| format!("{} > {}", wire.from, wire.to)).collect();
-    assert_eq!(wires, ["body.eyes.sonar.filtered > body.safety.ranges", "body.eyes.sonar.filtered > wall.ranges"]);
+    let wires: Vec<String> =
+        loaded.plan.wires.iter().map(|wire| format!("{} > {}", wire.from, wire.to)).collect();
+    assert_eq!(
+        wires,
+        ["body.eyes.sonar.filtered > body.safety.ranges", "body.eyes.sonar.filtered > wall.ranges"]
+    );
     let plan = bare(loaded.plan);
     assert_eq!(again(&plan), plan);
 }
@@ -154,7 +164,13 @@ fn wire(to: String) -> impl Strategy<Value = WirePlan> {
         move |(depth, overload, category, priority, marker, every)| WirePlan {
             depth,
             overload,
-            filter: Filter { category, least_priority: types::header::LeastPriority(priority), marker, every, ..Filter::ALL },
+            filter: Filter {
+                category,
+                least_priority: types::header::LeastPriority(priority),
+                marker,
+                every,
+                ..Filter::ALL
+            },
             ..WirePlan::new("eyes.filtered", to.clone())
         },
     )

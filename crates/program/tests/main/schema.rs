@@ -4,8 +4,8 @@ use std::fs;
 use std::path::Path;
 
 use boon::{Compiler, Schemas};
-use program::schema::{json_of, schema};
 use program::file::{Shelf, tree};
+use program::schema::{json_of, schema};
 use serde_json::Value as Json;
 
 use crate::registry;
@@ -54,7 +54,10 @@ fn a_parameter_carries_its_doc_its_range_and_its_default() {
     let kinds = schema["properties"]["agent"]["additionalProperties"]["anyOf"].as_array().unwrap();
     let safety = kinds.iter().find(|kind| kind["title"] == "safety-monitor").unwrap();
     let stop = &safety["properties"]["stop_distance"];
-    assert_eq!((&stop["type"], &stop["minimum"], &stop["maximum"]), (&"number".into(), &0.0.into(), &5.0.into()));
+    assert_eq!(
+        (&stop["type"], &stop["minimum"], &stop["maximum"]),
+        (&"number".into(), &0.0.into(), &5.0.into())
+    );
     assert!(stop["description"].as_str().unwrap().contains('m') && stop["default"].is_number());
     assert!(kinds.iter().all(|kind| kind["title"] != "robot"), "robots have a section of their own");
 }

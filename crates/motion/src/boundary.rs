@@ -1,0 +1,203 @@
+//! The hand rule for a round body among points: which ways are free, and which of them keeps a hand on the wall.
+//!
+//! ```text
+//!        · · ·  anchor                 The sweep begins at the anchor, the point that the hand touches, and turns away from it until
+//!       ·     ╲  │  ╱ first free way   the body fits through: that is the way along the wall. A gap that is wide enough is entered, a
+//!      ·       ╲ │ ╱                   narrower one is wall.
+//!     ·         (R)  ──▶ sweep
+//! ```
+//!
+//! What is in the way is a set of points in the frame of the robot, of a map or of a scan; the wall is on the left. For a wall on the
+//! right mirror the points and the answer.
+
+use libm::{ceil, cos, fabs, fmin, sin, sqrt};
+use types::Point;
+use types::geometry::{TAU, wrap};
+
+/// Directions of a fan: 5° apart, so two ways are told apart that differ by 4 cm at half a metre.
+pub const DIRECTIONS: usize = 72;
+
+/// The unit vectors of all directions, counter-clockwise from straight ahead; made once.
+#[derive(Clone, Copy, Debug)]
+pub struct Compass([Point; DIRECTIONS]);
+
+impl Default for Compass {
+    fn default() -> Compass {
+        let mut rose = [Point::default(); DIRECTIONS];
+        for (i, out) in rose.iter_mut().enumerate() {
+            *out = Point::new(cos(bearing(i)), sin(bearing(i)));
+        }
+        Compass(rose)
+    }
+}
+
+/// The bearing of a direction (rad), within ±π.
+pub fn bearing(direction: usize) -> f64 {
+    wrap(direction as f64 * TAU / DIRECTIONS as f64)
+}
+
+/// The direction that is nearest to a bearing (rad).
+pub fn direction(bearing: f64) -> usize {
+    let steps = libm::round(bearing * DIRECTIONS as f64 / TAU) as i64;
+    steps.rem_euclid(DIRECTIONS as i64) as usize
+}
+
+/// How far a body may go straight on in each direction (m), and what stops it there.
+#[derive(Clone, Copy, Debug)]
+pub struct Fan {
+    ways: [f64; DIRECTIONS],
+    stops: [Point; DIRECTIONS],
+}
+
+/// What is nearer than wanted already may stay as near, less this (m).
+const NO_NEARER: f64 = 0.01;
+
+impl Fan {
+    /// The free ways for a body that wants `room` (m) from its middle to everything.
+    ///
+    /// A point at distance ρ, off the direction by δ, stops the body after ρ cos δ − √(room² − ρ² sin² δ). With a point nearer than
+    /// `room` already it may go where it comes no nearer: then its distance counts in place of the room.
+    pub fn new(compass: &Compass, points: impl Iterator<Item = Point>, room: f64) -> Fan {
+        let mut fan = Fan { ways: [f64::INFINITY; DIRECTIONS], stops: [Point::default(); DIRECTIONS] };
+        for point in points {
+            let distance = point.norm();
+            let room = fmin(room, distance - NO_NEARER);
+            if room <= 0.0 {
+                continue;
+            }
+            let half = libm::asin(room / distance);
+            let (middle, span) = (direction(point.bearing()), ceil(half * DIRECTIONS as f64 / TAU) as usize);
+            for step in 0..=2 * span {
+                let i = (middle + DIRECTIONS + step - span) % DIRECTIONS;
+                let (along, across) = (point.dot(compass.0[i]), point.cross(compass.0[i]));
+                let under = room * room - across * across;
+                if along > 0.0 && under > 0.0 {
+                    let way = along - sqrt(under);
+                    if way < fan.ways[i] {
+                        (fan.ways[i], fan.stops[i]) = (way, point);
+                    }
+                }
+            }
+        }
+        fan
+    }
+
+    /// The free way in a direction (m); infinite if nothing is there.
+    pub fn way(&self, direction: usize) -> f64 {
+        self.ways[direction % DIRECTIONS]
+    }
+
+    /// What stops the body in a direction.
+    pub fn stop(&self, direction: usize) -> Point {
+        self.stops[direction % DIRECTIONS]
+    }
+
+    /// The first direction, from `start` clockwise, in which the way is free for `look` (m), and the point that stopped the direction before.
+    pub fn sweep(&self, start: usize, look: f64) -> Option<Found> {
+        let mut touched = None;
+        for step in 0..DIRECTIONS {
+            let i = (start + DIRECTIONS - step) % DIRECTIONS;
+            if self.ways[i] >= look {
+                return Some(Found { turned: step, direction: i, touched });
+            }
+            touched = Some(self.stops[i]);
+        }
+        None
+    }
+
+    /// The free direction that is nearest to `wanted`, off by no more than `most` (rad).
+    pub fn nearest_free(&self, wanted: usize, look: f64, most: f64) -> Option<usize> {
+        let steps = (most / TAU * DIRECTIONS as f64) as usize;
+        (0..=steps)
+            .flat_map(|step| [wanted + DIRECTIONS - step, wanted + step])
+            .map(|i| i % DIRECTIONS)
+            .find(|&i| self.ways[i] >= look)
+    }
+}
+
+/// The way along the wall.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Found {
+    /// How many directions were tried in vain.
+    pub turned: usize,
+    /// The free one.
+    pub direction: usize,
+    /// What the hand touches: the point that stopped the last try. None if the first one was free.
+    pub touched: Option<Point>,
+}
+
+/// How far two directions are apart (rad).
+pub fn apart(a: usize, b: usize) -> f64 {
+    fabs(wrap(bearing(a) - bearing(b)))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+    use std::vec::Vec;
+    use types::geometry::PI;
+
+    /// A wall along x at y, from a to b, a point every 5 cm.
+    fn wall(y: f64, from: f64, to: f64) -> Vec<Point> {
+        (0..=((to - from) / 0.05) as usize).map(|i| Point::new(from + 0.05 * i as f64, y)).collect()
+    }
+
+    fn fan(points: &[Point], room: f64) -> Fan {
+        Fan::new(&Compass::default(), points.iter().copied(), room)
+    }
+
+    #[test]
+    fn a_single_point_stops_a_disc_where_it_touches() {
+        let fan = fan(&[Point::new(1.0, 0.1)], 0.3);
+        assert!((fan.way(0) - (1.0 - (0.09f64 - 0.01).sqrt())).abs() < 1e-12);
+        assert_eq!(fan.way(direction(PI / 2.0)), f64::INFINITY);
+    }
+
+    #[test]
+    fn the_sweep_goes_along_a_wall_on_the_left() {
+        let points = wall(0.3, -2.0, 2.0);
+        let found = fan(&points, 0.28).sweep(direction(PI / 2.0), 0.7).unwrap();
+        assert_eq!(bearing(found.direction).to_degrees().round(), 0.0);
+        assert!(found.touched.unwrap().x > 0.0);
+    }
+
+    #[test]
+    fn a_gap_is_entered_when_the_body_fits_and_passed_when_not() {
+        for (gap, enters) in [(0.66, true), (0.5, false)] {
+            let mut points = wall(0.4, -2.0, -gap / 2.0);
+            points.extend(wall(0.4, gap / 2.0, 2.0));
+            let found = fan(&points, 0.28).sweep(direction(2.5), 0.7).unwrap();
+            assert_eq!(bearing(found.direction) > 1.2, enters, "{gap} m: {found:?}");
+        }
+    }
+
+    #[test]
+    fn from_too_near_it_may_go_away_and_along_but_not_nearer() {
+        let fan = fan(&wall(0.2, -2.0, 2.0), 0.4);
+        assert!(fan.way(direction(PI / 2.0)) < 0.05 && fan.way(direction(-PI / 2.0)).is_infinite());
+        assert!(fan.sweep(direction(PI / 2.0), 0.5).is_some_and(|found| bearing(found.direction) > -1.3));
+    }
+
+    #[test]
+    fn all_around_closed_there_is_no_way() {
+        let ring: Vec<Point> = (0..72).map(|i| Point::polar(0.5, f64::from(i) * PI / 36.0)).collect();
+        assert_eq!(fan(&ring, 0.28).sweep(0, 0.7), None);
+    }
+
+    proptest! {
+        /// At the end of a free way nothing is nearer than the room, or nearer than it was.
+        #[test]
+        fn a_free_way_is_free(points in proptest::collection::vec((0.3f64..2.0, -3.1f64..3.1), 1..40), i in 0usize..72) {
+            let points: Vec<Point> = points.iter().map(|(r, b)| Point::polar(*r, *b)).collect();
+            let fan = fan(&points, 0.3);
+            let way = fmin(fan.way(i), 3.0);
+            for k in 0..=20 {
+                let here = Point::polar(way * f64::from(k) / 20.0, bearing(i));
+                for p in &points {
+                    prop_assert!(here.distance(*p) >= fmin(0.3, p.norm() - NO_NEARER) - 1e-9);
+                }
+            }
+        }
+    }
+}

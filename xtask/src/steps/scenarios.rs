@@ -1,0 +1,92 @@
+//! The scenarios that come with Sinew, each over ten seeds.
+
+use serde_json::Value;
+
+use super::{Done, sinew};
+use crate::failure::Failure;
+use crate::tool::Tool;
+use crate::workspace::Workspace;
+
+const SCENARIOS: [&str; 2] = ["exploration", "annex"];
+const SEEDS: usize = 10;
+
+/// So many of the seeds must reach the goal; none may touch anything.
+const ENOUGH: usize = 9;
+
+pub(super) fn run(workspace: &Workspace) -> Result<Done, Failure> {
+    let program = sinew::build(workspace)?;
+    let mut seen = Vec::new();
+    for name in SCENARIOS {
+        let seeds = format!("1..{SEEDS}");
+        let out = workspace.fresh_scratch(name)?;
+        let words = ["run", name, "--seeds", &seeds, "--no-log", "--json", "--out"];
+        let document =
+            sinew::document(Tool::new(&program, &workspace.root).args(words).arg(&out), &remedy(name))?;
+        let met = judge(&document).map_err(|what| Failure::new(format!("{name}: {what}"), remedy(name)))?;
+        seen.push(format!("{name} {met} of {SEEDS}"));
+    }
+    Ok(Done::Passed(seen.join(", ")))
+}
+
+fn remedy(name: &str) -> String {
+    format!(
+        "Look at one seed: cargo run --release -- run {name} --seed N; its figures lie in the folder that the summary names."
+    )
+}
+
+/// How many seeds reached the goal, if they are enough and nothing was touched.
+fn judge(document: &Value) -> Result<usize, String> {
+    let runs =
+        document["runs"].as_array().or_else(|| document.as_array()).ok_or("the document has no \"runs\"")?;
+    if runs.len() != SEEDS {
+        return Err(format!("{} runs instead of {SEEDS}", runs.len()));
+    }
+    for run in runs {
+        match run["collisions"].as_u64() {
+            Some(0) => {}
+            Some(count) => return Err(format!("seed {}: {count} collisions", run["seed"])),
+            None => return Err(format!("seed {}: no \"collisions\" in the document", run["seed"])),
+        }
+    }
+    let missed: Vec<String> = runs
+        .iter()
+        .filter(|run| run["goal"]["met"] != true)
+        .map(|run| {
+            format!("seed {}: {}", run["seed"], run["goal"]["why"].as_str().unwrap_or("no reason given"))
+        })
+        .collect();
+    let met = runs.len() - missed.len();
+    if met >= ENOUGH {
+        Ok(met)
+    } else {
+        Err(format!("{met} of {SEEDS} reached the goal\n{}", missed.join("\n")))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use serde_json::json;
+
+    fn document(missed: usize, collisions: u64) -> Value {
+        let run = |seed: usize| json!({"seed": seed, "goal": {"met": seed > missed, "why": "stuck"}, "collisions": collisions});
+        json!({"runs": (1..=SEEDS).map(run).collect::<Vec<_>>()})
+    }
+
+    #[test]
+    fn nine_of_ten_are_enough_and_eight_are_not() {
+        assert_eq!(judge(&document(0, 0)), Ok(10));
+        assert_eq!(judge(&document(1, 0)), Ok(9));
+        assert!(
+            judge(&document(2, 0)).unwrap_err().contains("8 of 10 reached the goal\nseed 1: stuck\nseed 2")
+        );
+    }
+
+    #[test]
+    fn one_collision_is_too_many_and_a_document_without_runs_is_no_success() {
+        assert!(judge(&document(0, 1)).unwrap_err().contains("collisions"));
+        for broken in [json!({}), json!({"runs": []}), json!([{"seed": 1}])] {
+            assert!(judge(&broken).is_err(), "{broken}");
+        }
+    }
+}
