@@ -257,6 +257,10 @@ pub struct AgentView {
     pub jitter: Figure,
     /// From the release to the end (ns).
     pub response: Figure,
+    /// The histogram of how long steps ran: upper ends of its steps (ns) and counts.
+    pub exec_steps: Vec<(f64, u32)>,
+    /// The histogram of how late steps began.
+    pub jitter_steps: Vec<(f64, u32)>,
 }
 
 /// What is counted of an agent.

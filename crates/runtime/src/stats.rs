@@ -90,6 +90,12 @@ impl Histogram {
         bucket.store(bucket.load(Relaxed).wrapping_add(1), Relaxed);
     }
 
+    /// How many values lie in each of its steps that is not empty: the upper end of the step (ns), and the count.
+    pub fn steps(&self) -> Vec<(f64, u32)> {
+        let counts = self.buckets.iter().map(|bucket| bucket.load(Relaxed)).enumerate();
+        counts.filter(|(_, count)| *count > 0).map(|(bucket, count)| (upper(bucket), count)).collect()
+    }
+
     /// What it shows now. Percentiles are the upper ends of steps of an eighth of a doubling.
     pub fn figure(&self) -> Figure {
         let n = self.n.load(Relaxed);

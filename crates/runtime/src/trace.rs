@@ -142,6 +142,10 @@ impl Writer {
     #[inline]
     unsafe fn copy(&self, at: usize, from: *const u8, bytes: usize) {
         debug_assert!(at + words_for(bytes) <= self.shared.words.len());
+        // What is empty may stand behind the last word, where there is no place to name.
+        if bytes == 0 {
+            return;
+        }
         // SAFETY: the caller's promise; the words lie together.
         unsafe { core::ptr::copy_nonoverlapping(from, self.shared.words[at].get().cast::<u8>(), bytes) };
     }
@@ -232,6 +236,9 @@ impl Reader {
     }
 
     fn words(&self, at: usize, len: usize) -> &[u64] {
+        if len == 0 {
+            return &[];
+        }
         // SAFETY: as in `word`; they lie together because the writer skips to the start instead of wrapping.
         unsafe { core::slice::from_raw_parts(self.shared.words[at].get(), len) }
     }
@@ -309,6 +316,18 @@ mod tests {
             });
         }
         assert_eq!((seen, reader.dropped()), (200, 0));
+    }
+
+    #[test]
+    fn an_empty_row_may_stand_behind_the_last_word() {
+        let record = 3 + HEADER_WORDS + 2;
+        // A ring in which the records end exactly at its end.
+        let (mut writer, mut reader) = ring(record * 4, false);
+        for _ in 0..50 {
+            writer.message(0, &Header::default(), &Twist::ZERO, &[0u8; 0]);
+            assert_eq!(reader.drain(|_| {}), 1);
+        }
+        assert_eq!(reader.dropped(), 0);
     }
 
     #[test]

@@ -54,6 +54,8 @@ impl Router {
             exec: stats.exec.figure(),
             jitter: stats.jitter.figure(),
             response: stats.response.figure(),
+            exec_steps: stats.exec.steps(),
+            jitter_steps: stats.jitter.steps(),
         }
     }
 
