@@ -14,8 +14,6 @@ use types::Point;
 pub(crate) use scenery::notes;
 use trail::{Seen, Trail};
 
-use crate::run::Samples;
-
 /// Dots in an inch of a PNG: what journals ask of line art at this size.
 const DOTS: f64 = 200.0;
 /// The part of a run that the figure of periods shows (s): a second or two, or the marks run into each other.
@@ -155,20 +153,24 @@ fn periods(trail: &Trail) -> Option<Periods> {
     (!rows.is_empty()).then_some(Periods { rows, window: Some(window) })
 }
 
-/// Single steps of each agent, with the counts of all.
-pub(crate) fn timing(agents: &[AgentView], samples: &Samples) -> Timing {
-    let seconds = |nanos: &[f64]| nanos.iter().map(|nanos| nanos * 1e-9).collect();
-    let row = |agent: &AgentView| {
-        let steps = samples.0.get(&agent.name)?;
-        (!steps.exec.is_empty()).then(|| AgentTiming {
-            name: agent.name.clone(),
-            execution: seconds(&steps.exec),
-            jitter: seconds(&steps.jitter),
-            deadline: Some(agent.deadline.seconds()),
-            misses: agent.counts.missed,
-        })
+/// The histograms of each agent's steps, with the counts. An agent that never ran has no row.
+pub(crate) fn timing(agents: &[AgentView]) -> Timing {
+    let seconds = |nanos: f64| nanos * 1e-9;
+    let classes = |steps: &[(f64, u32)]| -> Vec<(f64, u64)> {
+        steps.iter().map(|(nanos, count)| (seconds(*nanos), u64::from(*count))).collect()
     };
-    Timing { agents: agents.iter().filter_map(row).collect() }
+    let ran = agents.iter().filter(|agent| !agent.exec_steps.is_empty());
+    let rows = ran.map(|agent| AgentTiming {
+        name: agent.name.clone(),
+        execution: classes(&agent.exec_steps),
+        jitter: classes(&agent.jitter_steps),
+        execution_max: Some(seconds(agent.exec.max)),
+        jitter_max: Some(seconds(agent.jitter.max)),
+        deadline: Some(agent.deadline.seconds()),
+        misses: agent.counts.missed,
+        releases: agent.counts.releases,
+    });
+    Timing { agents: rows.collect() }
 }
 
 /// The notes of a log that figures are made from, and nothing that differs between two runs of the same seed.

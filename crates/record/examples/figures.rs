@@ -187,20 +187,33 @@ fn velocity(way: &[(Waypoint, f64, f64)]) -> Velocity {
     }
 }
 
+/// Counts values in classes of an eighth of a doubling: their upper ends (s), and how many values.
+fn histogram(values: &[f64]) -> Vec<(f64, u64)> {
+    let mut classes = std::collections::BTreeMap::new();
+    for value in values {
+        *classes.entry((value.log2() * 8.0).floor() as i32).or_insert(0) += 1;
+    }
+    classes.into_iter().map(|(class, count)| ((f64::from(class + 1) / 8.0).exp2(), count)).collect()
+}
+
 fn timing() -> Timing {
     let agent = |name: &str, typical: f64, wide: f64, deadline: Option<f64>, misses, seed: usize| {
         let draw = |i: usize, typical: f64, wide: f64| {
             let bell = (0..4).map(|k| noise(i * 4 + k + seed * 1000)).sum::<f64>();
             typical * (wide * bell).exp()
         };
+        let execution: Vec<f64> = (0..6000).map(|i| draw(i, typical, wide)).collect();
+        let late = |i: usize| if i.is_multiple_of(900) { 40.0 } else { 1.0 };
+        let jitter: Vec<f64> = (0..6000).map(|i| draw(i + 7000, 4e-6, 0.5) * late(i)).collect();
         AgentTiming {
             name: name.into(),
-            execution: (0..6000).map(|i| draw(i, typical, wide)).collect(),
-            jitter: (0..6000)
-                .map(|i| draw(i + 7000, 4e-6, 0.5) * if i % 900 == 0 { 40.0 } else { 1.0 })
-                .collect(),
+            execution: histogram(&execution),
+            jitter: histogram(&jitter),
+            execution_max: execution.into_iter().reduce(f64::max),
+            jitter_max: jitter.into_iter().reduce(f64::max),
             deadline,
             misses,
+            releases: 6000,
         }
     };
     Timing {

@@ -225,6 +225,8 @@ fn a_full_disk_is_told_once_and_what_is_lost_is_counted() {
     let tally = writer.tally();
     assert_eq!(told.len(), 1, "{told:?}");
     assert!(told[0].contains("later messages are lost"), "{told:?}");
+    let why = io::Error::from(io::ErrorKind::StorageFull).to_string();
+    assert!(told[0].contains(&why), "the cause is told: {told:?}");
     assert_eq!(tally.safe + tally.lost, 200, "{tally:?}");
     assert!(tally.safe > 30 && tally.lost > 30, "{tally:?}");
     assert!(writer.channel("/other", &describe::<Twist>()).is_ok(), "the run goes on");
@@ -243,6 +245,7 @@ fn a_log_that_cannot_be_made_says_so() {
         // A device that is always full.
         let refused = Writer::create("/dev/full", &run()).err().unwrap();
         assert!(matches!(refused, log::WriteError::Ended(_)), "{refused}");
+        assert!(refused.to_string().contains("No space left on device"), "{refused}");
     }
 }
 

@@ -10,11 +10,11 @@ mod judge;
 mod options;
 mod prepare;
 mod recorder;
-mod sampler;
 mod screen;
 mod seeds;
 mod serve;
 mod summary;
+mod timing;
 
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
@@ -33,8 +33,7 @@ use crate::{figures, file, terminal};
 pub(crate) use judge::{Facts, Judge, WORLD};
 pub(crate) use prepare::{ROBOT_KIND, Ready, Scenario};
 pub(crate) use recorder::{LogFile, choice};
-pub(crate) use sampler::Samples;
-pub(crate) use summary::{Summary, failure, figure_json, span, table};
+pub(crate) use summary::{Summary, failure, span, table};
 
 /// How long a simulated system without a goal runs when nobody says: long enough to see what it does.
 const WITHOUT_GOAL: Duration = Duration::secs(60);
@@ -147,11 +146,11 @@ impl One<'_> {
             observer: Box::new(judge),
             parse: control::words::parse,
         };
-        let (report, samples) = self.play(&ready, options)?;
+        let report = self.play(&ready, options)?;
         let mut summary = Summary::new(&ready, self.seed, clock_name(self.clock), report);
         summary.images = self.args.images;
         summary.log = outcome.map(|outcome| outcome.lock().unwrap_or_else(PoisonError::into_inner).clone());
-        self.write_files(&mut summary, samples);
+        self.write_files(&mut summary);
         Ok(summary)
     }
 
@@ -195,8 +194,8 @@ impl One<'_> {
         }
     }
 
-    /// Runs it, and meanwhile draws it, answers others, and samples how long steps take.
-    fn play(&self, ready: &Ready, options: Options) -> Result<(Report, sampler::Samples), Failure> {
+    /// Runs it, and meanwhile draws it and answers others.
+    fn play(&self, ready: &Ready, options: Options) -> Result<Report, Failure> {
         let sources = &self.scenario.file.sources;
         let cannot = |error: CannotRun| summary::failure(error, sources);
         match self.clock {
@@ -204,13 +203,15 @@ impl One<'_> {
                 let simulation = Simulation::new(&ready.plan, &ready.registry, options).map_err(cannot)?;
                 let beside = self.beside(ready, simulation.control())?;
                 let report = simulation.run();
-                Ok((report.map_err(cannot)?, beside.end()))
+                beside.end();
+                report.map_err(cannot)
             }
             ClockChoice::Wall => {
                 let live = Live::new(&ready.plan, &ready.registry, options).map_err(cannot)?;
                 let beside = self.beside(ready, live.control())?;
                 let report = live.run();
-                Ok((report.map_err(cannot)?, beside.end()))
+                beside.end();
+                report.map_err(cannot)
             }
         }
     }
@@ -218,15 +219,14 @@ impl One<'_> {
     fn beside(&self, ready: &Ready, control: Control) -> Result<Beside, Failure> {
         Ok(Beside {
             server: if self.serves { serve::start(ready, &control) } else { None },
-            screen: if self.watched { Some(screen::Screen::start(ready, control.clone())?) } else { None },
-            sampler: if self.place.is_some() { sampler::Sampler::start(control) } else { None },
+            screen: if self.watched { Some(screen::Screen::start(ready, control)?) } else { None },
         })
     }
 
-    fn write_files(&self, summary: &mut Summary, samples: sampler::Samples) {
+    fn write_files(&self, summary: &mut Summary) {
         let Some(place) = &self.place else { return };
         let timing = place.folder.join("timing.json");
-        match std::fs::write(&timing, sampler::to_json(summary, &samples).to_string()) {
+        match std::fs::write(&timing, timing::to_json(summary).to_string()) {
             Ok(()) => summary.files.push(timing),
             Err(error) => {
                 terminal::tell(&format!("warning: {} cannot be written: {error}", timing.display()))
@@ -236,7 +236,7 @@ impl One<'_> {
         if log.is_file() {
             summary.files.insert(0, log.clone());
         }
-        let made = figures::of_log(log, &place.folder, Some(figures::timing(&summary.agents, &samples)));
+        let made = figures::of_log(log, &place.folder, Some(figures::timing(&summary.agents)));
         match made {
             Ok(files) => summary.files.extend(files),
             Err(error) => terminal::tell(&format!("warning: no figures: {error}")),
@@ -248,14 +248,12 @@ impl One<'_> {
 struct Beside {
     server: Option<serve::Serving>,
     screen: Option<screen::Screen>,
-    sampler: Option<sampler::Sampler>,
 }
 
 impl Beside {
-    fn end(self) -> sampler::Samples {
+    fn end(self) {
         drop(self.server);
         drop(self.screen);
-        self.sampler.map(sampler::Sampler::end).unwrap_or_default()
     }
 }
 

@@ -83,8 +83,10 @@ mod tests {
             vec![Waypoint { time: f64::NAN, pose: nowhere }, Waypoint { time: 1.0, pose: Pose::default() }];
         let agent = AgentTiming {
             name: "a".into(),
-            execution: vec![0.0, f64::NAN, -1.0],
-            jitter: vec![0.0],
+            execution: vec![(0.0, 1), (f64::NAN, 2), (-1.0, 3), (1.0, 0)],
+            jitter: vec![(0.0, 1)],
+            execution_max: Some(f64::INFINITY),
+            jitter_max: Some(0.0),
             ..AgentTiming::default()
         };
         let row = PeriodRow { releases: vec![f64::NAN, 1.0], ..PeriodRow::default() };

@@ -49,7 +49,8 @@ pub enum WriteError {
     },
     /// The file cannot be written any more: a full disk, mostly. What is in it can still be read.
     #[error(
-        "the log ends here: {0}; what was written before can be read, later messages are lost and counted"
+        "the log ends here: {}; what was written before can be read, later messages are lost and counted",
+        cause(.0)
     )]
     Ended(mcap::McapError),
     /// A definition has the name of another one that differs.
@@ -58,6 +59,14 @@ pub enum WriteError {
     /// A file holds at most 65 535 topics and as many definitions.
     #[error("the log has no room for another topic: {0}")]
     TooMany(mcap::McapError),
+}
+
+/// What went wrong as the system says it: the library's own words hide whether the disk is full or gone.
+fn cause(error: &mcap::McapError) -> String {
+    match error {
+        mcap::McapError::Io(cause) => cause.to_string(),
+        other => other.to_string(),
+    }
 }
 
 /// Writes the log of a run. Dropping it ends the file as [`finish`](Self::finish) does, but tells no errors.
