@@ -344,6 +344,10 @@ impl Router {
             };
             on.extend(ends[place].input.clone());
         }
+        // Answers make a client run, wherever they come from.
+        let clients =
+            kind.ports.iter().zip(&ends).filter(|(port, _)| port.shape.direction == Direction::Client);
+        on.extend(clients.filter_map(|(_, end)| end.input.clone()));
         self.number_outputs(&plan.name, &kind, &ends);
 
         self.next_agent += 1;

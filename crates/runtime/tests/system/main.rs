@@ -335,6 +335,8 @@ fn a_call_is_answered_or_its_time_out_comes_as_a_message() {
     plan.on("answerer", "half");
     plan.on("sink", "count");
     plan.requests = vec![at(150, "fault answerer off")];
+    // The answer comes from another executor than the one that waits for it.
+    plan.agent_mut("answerer").unwrap().executor = Some("ordinary".into());
     Simulation::new(&plan, &types(), options(350)).unwrap().run().unwrap();
     let heard: Vec<(i64, f64)> =
         heard("calls").iter().map(|(time, twist)| (time.0 / 1_000_000, twist.linear)).collect();
