@@ -6,7 +6,7 @@ use motion::ring::Ring;
 use motion::safety::{Parameters, Verdict, judge};
 use perception::local_map::{LocalMap, MapParams};
 use runtime::{Agent, Fault, Input, Output, Step};
-use types::geometry::PI;
+use types::geometry::{PI, wrap};
 use types::messages::{Drive, Odometry, Offer, Ranges, Safety, Twist};
 use types::params::Params;
 use types::{Duration, Pose, Time};
@@ -28,8 +28,8 @@ pub struct SafetyParams {
     /// Way left in front after stopping, from the body's rim (m). 0.05 keeps it from creeping up on what it stopped for.
     #[param(default = 0.05, min = 0.0, max = 2.0)]
     pub margin: f64,
-    /// Way ahead, from the body's rim, below which it must not move forward (m). 0.2 is clear of the 0.15 m below which a sonar tells nothing.
-    #[param(default = 0.2, min = 0.0, max = 5.0)]
+    /// Way ahead, from the body's rim, below which it must not move forward (m). 0.1 is what is left beside the body in the narrowest way, and a creep stops within half of it.
+    #[param(default = 0.1, min = 0.0, max = 5.0)]
     pub stop_distance: f64,
     /// From an echo to the wheels' answer (s). 0.35 is a period of the sonar, one of the drive and the lag of the motors.
     #[param(default = 0.35, min = 0.0, max = 5.0)]
@@ -64,8 +64,8 @@ pub struct SafetyParams {
     /// Highest speed with something that close beside it (m/s). 0.1 is 2.5 cm between two readings at 4 Hz.
     #[param(default = 0.1, min = 0.0, max = 10.0)]
     pub creep: f64,
-    /// How long what was near is remembered while no sensor hears it (time). 30 s is how long a robot may turn about in a corner; on so short a way the odometry drifts by centimetres.
-    #[param(default = Duration::secs(30), min = 0.0, max = 60.0)]
+    /// How long what was near is remembered while no sensor hears it (time). 10 s is a metre at a creep; longer, and somebody who was followed still stands where he has left.
+    #[param(default = Duration::secs(10), min = 0.0, max = 60.0)]
     pub remember: Duration,
     /// How long a wish of it holds (time). 500 ms is two readings of a sonar at 4 Hz.
     #[param(default = Duration::millis(500), min = 0.01, max = 60.0)]
@@ -144,6 +144,8 @@ impl Agent for SafetyMonitor {
 /// The most occupied cells that are looked at.
 const POINTS: usize = 2048;
 
+/// What is nearer to straight ahead than this is in front (rad): 40°, the beams that look ahead.
+const IN_FRONT: f64 = 0.7;
 /// What is farther from straight ahead than this is left behind (rad): 110°.
 const BESIDE: f64 = 0.6 * PI;
 /// A turn at this rate is one (rad/s), not the noise of a controller.
@@ -184,7 +186,7 @@ impl Watch {
                 (verdict.nearest, verdict.nearest_bearing) = (remembered.nearest, remembered.nearest_bearing);
             }
         }
-        self.touch(params, &mut verdict);
+        self.touch(params, &filtered, &mut verdict);
         let offer = self.avoid(params, &mut verdict, now);
         let nothing_heard =
             [ring(&raw), ring(&filtered)].iter().all(|ring: &Ring<'_>| ring.echoes().next().is_none());
@@ -224,8 +226,12 @@ impl Watch {
         (len > 0).then(|| judge(&params.law(), points, points, self.motion))
     }
 
-    /// With something beside it as near as can be told it creeps.
-    fn touch(&self, params: &SafetyParams, verdict: &mut Verdict) {
+    /// With something beside it as near as can be told it creeps; with that in front it may be nearer than told, and it stands.
+    fn touch(&self, params: &SafetyParams, filtered: &Ranges, verdict: &mut Verdict) {
+        let close = f64::from(filtered.range_min).max(params.radius + params.touch);
+        if echoes(filtered).any(|(bearing, range)| range <= close && wrap(bearing).abs() < IN_FRONT) {
+            (verdict.forward, verdict.linear_max) = (false, 0.0);
+        }
         if verdict.nearest <= params.touch && verdict.nearest_bearing.abs() <= BESIDE {
             verdict.linear_max = verdict.linear_max.min(params.creep);
         }
@@ -246,8 +252,10 @@ impl Watch {
         verdict.wider = self.side;
         // With room ahead it is no wall but a neighbour: the nearer it is in front, the harder the turn.
         let turn = if verdict.forward { params.avoid_turn * verdict.danger } else { params.avoid_turn };
+        let close = verdict.nearest <= params.touch;
+        let speed = if close { 0.0 } else { verdict.linear_max.min(params.avoid_speed) };
         Some(Offer {
-            twist: Twist::new(verdict.linear_max.min(params.avoid_speed), self.side * turn),
+            twist: Twist::new(speed, self.side * turn),
             weight: verdict.danger,
             valid_until: now + params.hold,
             form: Drive::Numeric,
@@ -278,9 +286,11 @@ mod tests {
     #[test]
     fn too_close_ahead_it_turns_to_the_wider_side_and_does_not_move() {
         for (left, right, side) in [(3.0, 0.6, 1.0), (0.6, 3.0, -1.0)] {
-            let (safety, offer) = watch(around(0.4, left, right)).judge(&SafetyParams::default(), Time::ZERO);
+            let (safety, offer) =
+                watch(around(0.38, left, right)).judge(&SafetyParams::default(), Time::ZERO);
             let offer = offer.unwrap();
-            assert_eq!((safety.linear_max, offer.twist.linear, offer.weight), (0.0, 0.0, 1.0));
+            assert_eq!((safety.linear_max, offer.twist.linear), (0.0, 0.0));
+            assert!(offer.weight > 0.85, "{}", offer.weight);
             assert_eq!(offer.twist.angular, side * 0.7);
         }
     }
@@ -315,7 +325,7 @@ mod tests {
         // A smooth box that is silent now, and a robot that has come nearer.
         let later = Time::from_seconds(2.0);
         watch.filtered = Some(Dated { value: around(6.2, 4.0, 4.0), stamp: later });
-        watch.pose = Some(Pose::new(0.3, 0.0, 0.0));
+        watch.pose = Some(Pose::new(0.4, 0.0, 0.0));
         assert_eq!(watch.judge(&params, later).0.linear_max, 0.0);
         let unaware = SafetyParams { remember: Duration::ZERO, ..params };
         let later = Time::from_seconds(2.1);
@@ -337,7 +347,7 @@ mod tests {
     #[test]
     fn it_goes_on_turning_to_the_side_to_which_it_turns_already() {
         let side = |angular| {
-            let mut watch = watch(around(0.4, 3.0, 0.6));
+            let mut watch = watch(around(0.38, 3.0, 0.6));
             watch.motion = Twist::new(0.0, angular);
             let (safety, offer) = watch.judge(&SafetyParams::default(), Time::ZERO);
             (safety.wider, offer.unwrap().twist.angular)
@@ -348,7 +358,7 @@ mod tests {
     #[test]
     fn a_raw_echo_right_ahead_forbids_to_move_before_the_filter_believes_it() {
         let mut watch = watch(around(4.0, 4.0, 4.0));
-        watch.raw = Some(Dated { value: around(0.4, 4.0, 4.0), stamp: Time::ZERO });
+        watch.raw = Some(Dated { value: around(0.32, 4.0, 4.0), stamp: Time::ZERO });
         assert_eq!(watch.judge(&SafetyParams::default(), Time::ZERO).0.linear_max, 0.0);
     }
 }

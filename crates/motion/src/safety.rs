@@ -90,19 +90,24 @@ pub fn speed_to_stop_within(way: f64, reaction: f64, deceleration: f64) -> f64 {
 /// `raw` is the ring as it was measured, `filtered` after the sensor's filter. The filtered one sets the speed with the margin; the raw
 /// one, which may hold a false echo but has no delay, is obeyed without the margin, so a single false echo far away costs no speed. Both
 /// together decide whether it may move forward. `present` is how the robot moves; in a curve the corridor that it is about to sweep
-/// counts as well as the straight one. With no echo at all in both rings it may not move forward: it is blind.
+/// counts as well as the straight one, as far as it takes to stop. With no echo at all in both rings it may not move forward: it is blind.
 pub fn judge(parameters: &Parameters, raw: Ring<'_>, filtered: Ring<'_>, present: Twist) -> Verdict {
     let blind = raw.echoes().next().is_none() && filtered.echoes().next().is_none();
     let present = if crate::kinematics::is_finite(present) { present } else { Twist::ZERO };
-    let (way_raw, way_filtered) = (ahead(parameters, raw, present), ahead(parameters, filtered, present));
-    let way = fmin(way_raw, way_filtered);
-    let forward = !blind && way > parameters.stop;
+    let (heard, believed) = (ahead(parameters, raw, present), ahead(parameters, filtered, present));
+    let straight = fmin(heard.straight, believed.straight);
+    let curved = fmin(heard.curved, believed.curved);
+    let forward = !blind && straight > parameters.stop && curved > parameters.margin;
     let speed = |way: f64| speed_to_stop_within(way, parameters.reaction, parameters.deceleration);
-    let safe = fmin(speed(way_raw), speed(way_filtered - parameters.margin));
+    let safe = fmin(
+        speed(fmin(heard.straight, heard.curved)),
+        speed(fmin(believed.straight, believed.curved) - parameters.margin),
+    );
     let (nearest, nearest_bearing) = nearest_of(parameters, raw, filtered);
-    let needed = stopping_distance(fmax(present.linear, 0.0), parameters.reaction, parameters.deceleration)
-        + parameters.stop;
-    let in_time = if way > 0.0 { needed / way } else { 1.0 };
+    let needed = stopping_distance(fmax(present.linear, 0.0), parameters.reaction, parameters.deceleration);
+    // The curve will not be driven to its end, so there is no start to be forbidden; it must be stopped in time all the same.
+    let share = |needed: f64, way: f64| if way > 0.0 { needed / way } else { 1.0 };
+    let in_time = fmax(share(needed + parameters.stop, straight), share(needed, curved));
     let close = 1.0 - nearest / parameters.horizon;
     let (left, right) = (room(parameters, filtered, 1.0), room(parameters, filtered, -1.0));
     Verdict {
@@ -111,19 +116,31 @@ pub fn judge(parameters: &Parameters, raw: Ring<'_>, filtered: Ring<'_>, present
         wider: if left + right > 0.0 { (left - right) / (left + right) } else { 0.0 },
         danger: if blind { 1.0 } else { fmin(fmax(fmax(in_time, close), 0.0), 1.0) },
         narrow: is_narrow(parameters, filtered),
-        ahead: way,
+        ahead: fmin(straight, curved),
         nearest,
         nearest_bearing,
     }
 }
 
-/// Free way (m) from the body's edge, straight on and on the present curve.
-fn ahead(parameters: &Parameters, ring: Ring<'_>, present: Twist) -> f64 {
+/// Free ways (m) from the body's edge.
+#[derive(Clone, Copy)]
+struct Ahead {
+    straight: f64,
+    /// On the present curve; infinite while it goes straight.
+    curved: f64,
+}
+
+/// Free way straight on and on the present curve.
+fn ahead(parameters: &Parameters, ring: Ring<'_>, present: Twist) -> Ahead {
     let curvature = if present.linear > 0.02 { present.angular / present.linear } else { 0.0 };
-    ring.echoes().filter(|echo| echo.range.is_finite()).fold(f64::INFINITY, |way, echo| {
-        let straight = way_straight(parameters, echo);
-        let curved = if fabs(curvature) > 0.05 { way_curved(parameters, echo, curvature) } else { straight };
-        fmin(way, fmin(straight, curved))
+    let free = Ahead { straight: f64::INFINITY, curved: f64::INFINITY };
+    ring.echoes().filter(|echo| echo.range.is_finite()).fold(free, |way, echo| Ahead {
+        straight: fmin(way.straight, way_straight(parameters, echo)),
+        curved: if fabs(curvature) > 0.05 {
+            fmin(way.curved, way_curved(parameters, echo, curvature))
+        } else {
+            way.curved
+        },
     })
 }
 

@@ -27,10 +27,12 @@ const SIDE: i32 = 128;
 /// Evidence is kept within these: a thing that comes where it was free, or goes, is believed after two or three readings.
 const EVIDENCE: (i8, i8) = (-2, 6);
 /// From this evidence on a cell explains an echo: it was heard from nearby, or often.
-const SURE: i8 = 4;
+const SURE: i8 = 3;
 /// The part of a cone on which an echo is put, and the part in which it says that nothing is nearer: at the edges of a cone echoes are faint.
 const ARC: f64 = 0.95;
-const INSIDE: f64 = 0.8;
+const INSIDE: f64 = 0.9;
+/// Within this of a sensor its cone is narrow, and what it tells counts double (m).
+const NEARBY: f64 = 0.8;
 
 /// What is known of the sensors, and how long to remember.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -144,9 +146,10 @@ impl LocalMap {
         let mut away = CELL / 2.0;
         while away < free {
             let steps = floor(INSIDE * self.params.cone * away / CELL) as i32;
+            let loss = if away < NEARBY { 2 } else { 1 };
             for step in -steps..=steps {
                 let cell = self.cell(sensor.point(away, f64::from(step) * CELL));
-                cell.evidence = (cell.evidence - 1).max(EVIDENCE.0);
+                cell.evidence = (cell.evidence - loss).max(EVIDENCE.0);
             }
             away += CELL;
         }
@@ -157,22 +160,13 @@ impl LocalMap {
         let half = ARC * self.params.cone;
         let steps = libm::ceil(half * range / (0.8 * CELL)).max(1.0) as i32;
         let arc = (-steps..=steps).map(|step| half * f64::from(step) / f64::from(steps));
+        // What is told as the shortest range may be as near as nothing.
         let at_shortest = range <= self.params.shortest + CELL / 2.0;
         let nearest = if at_shortest { 0.0 } else { range - CELL };
-        let mut explained = false;
-        for angle in arc.clone() {
-            let mut away = nearest;
-            while away <= range + 1.01 * CELL {
-                let cell = self.cell(sensor.turned(away, angle));
-                if cell.evidence >= SURE {
-                    explained = true;
-                    cell.heard = tick;
-                    cell.evidence = (cell.evidence + 1).min(EVIDENCE.1);
-                }
-                away += CELL;
-            }
-        }
-        if explained {
+        let range_to = range + 1.01 * CELL;
+        let surest = self.surest(sensor, arc.clone(), (nearest, range_to));
+        if surest >= SURE {
+            self.strengthen(sensor, arc, (nearest, range_to), (surest - 1).max(SURE), tick);
             return;
         }
         let gain = if range < 0.6 {
@@ -186,6 +180,41 @@ impl LocalMap {
             let cell = self.cell(sensor.turned(range, angle));
             cell.evidence = (cell.evidence + gain).min(EVIDENCE.1);
             cell.heard = tick;
+        }
+    }
+
+    /// The greatest evidence between two ranges on an arc.
+    fn surest(&mut self, sensor: Sensor, arc: impl Iterator<Item = f64>, between: (f64, f64)) -> i8 {
+        let mut surest = EVIDENCE.0;
+        for angle in arc {
+            let mut away = between.0;
+            while away <= between.1 {
+                surest = surest.max(self.cell(sensor.turned(away, angle)).evidence);
+                away += CELL;
+            }
+        }
+        surest
+    }
+
+    /// More evidence for those cells between two ranges on an arc that have this much already.
+    fn strengthen(
+        &mut self,
+        sensor: Sensor,
+        arc: impl Iterator<Item = f64>,
+        between: (f64, f64),
+        least: i8,
+        tick: i32,
+    ) {
+        for angle in arc {
+            let mut away = between.0;
+            while away <= between.1 {
+                let cell = self.cell(sensor.turned(away, angle));
+                if cell.evidence >= least {
+                    cell.heard = tick;
+                    cell.evidence = (cell.evidence + 1).min(EVIDENCE.1);
+                }
+                away += CELL;
+            }
         }
     }
 
@@ -320,11 +349,11 @@ mod tests {
         for i in 0..40 {
             let pose = Pose::new(0.05 * f64::from(i), 0.0, 0.0);
             let seen = pose.inverse().transform(post);
-            let echoes = (0..12).filter_map(|k| {
+            let echoes = (0..12).map(|k| {
                 let bearing = f64::from(k) * PI / 6.0;
                 let off = seen - Point::polar(0.225, bearing);
                 let hears = types::geometry::wrap(off.bearing() - bearing).abs() < PI / 12.0;
-                Some((bearing, if hears { 0.225 + off.norm() } else { 4.0 }))
+                (bearing, if hears { 0.225 + off.norm() } else { 4.0 })
             });
             map.update(echoes, pose, at(0.2 * f64::from(i)));
         }
