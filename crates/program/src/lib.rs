@@ -2,7 +2,7 @@
 //!
 //! | to find | look in |
 //! |---|---|
-//! | from a system file to a plan and back | [`file`] |
+//! | from a system file to a plan and back | [`mod@file`] |
 //! | its schema for editors | [`schema`] |
 //! | templates of agents and systems | [`new`] |
 //! | what a machine can do for real time | [`doctor`] |
