@@ -30,7 +30,7 @@ use crate::shared::Dated;
 /// The levels, and the table of the decisions.
 #[derive(Clone, Debug, Params)]
 pub struct DecisionParams {
-    /// For each situation the weight of each agent's offers, from 0 to 1, as in "danger.near" = { safety = 1.0, wall = 0.0 }. The section [decide] of a system file is this table.
+    /// For each situation the weight of each agent's offers, from 0 to 1, as in "danger.near" = { safety = 1.0, wall = 0.0 }. The section `[decide]` of a system file is this table.
     pub table: Table,
     /// Danger from which on it is near (0 to 1). 0.95: a door is 0.85 and a slow approach to a wall stays below.
     #[param(default = 0.95, min = 0.0, max = 1.0)]
