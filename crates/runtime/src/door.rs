@@ -42,6 +42,12 @@ impl Door {
         }
     }
 
+    /// Whether any bit is set.
+    #[inline]
+    pub(crate) fn is_rung(&self) -> bool {
+        self.ready.load(Ordering::Relaxed) != 0
+    }
+
     /// Takes all bits. What was pushed before they were set is seen after this.
     #[inline]
     pub(crate) fn take(&self) -> u64 {

@@ -206,20 +206,25 @@ impl Player {
                 if self.blocked[at] > self.now {
                     continue;
                 }
-                let core = &mut self.cores[at];
+                let mut core = &mut self.cores[at];
                 core.look_at_door(&self.context, self.now);
-                if let Some(job) = core.next(self.now) {
+                while let Some(job) = core.next(self.now) {
                     // SAFETY: the core lives in this thread's own array, and nobody else takes it.
                     let ended = unsafe { Core::run(core, &self.context, job, self.now, None, || true) };
-                    if let Some(Ended::AskedToHang(slot)) = ended {
-                        self.hang(at, slot);
-                    }
                     steps += 1;
                     if steps > STEPS_AT_ONCE * (1 + self.router.agents_count() as u64) {
                         return Err(self.endless());
                     }
-                    // The step may have woken somebody of higher priority.
-                    continue 'again;
+                    if let Some(Ended::AskedToHang(slot)) = ended {
+                        self.hang(at, slot);
+                        continue 'again;
+                    }
+                    // A step makes others ready at this instant by ringing at their doors, and in no other way.
+                    if self.order[..place].iter().any(|higher| self.cores[*higher].door.is_rung()) {
+                        continue 'again;
+                    }
+                    core = &mut self.cores[at];
+                    core.look_at_door(&self.context, self.now);
                 }
             }
             return Ok(());
