@@ -140,7 +140,7 @@ struct Runner {
     guards: Vec<std::thread::JoinHandle<()>>,
     over: Arc<AtomicBool>,
     hung: Arc<AtomicU32>,
-    spare_readers: SpareLogs,
+    spare_logs: SpareLogs,
     log: LogThread,
     asks: Receiver<Ask>,
     options: Options,
@@ -187,7 +187,7 @@ impl Runner {
             guards: Vec::new(),
             over: Arc::default(),
             hung: Arc::default(),
-            spare_readers: writers,
+            spare_logs: writers,
             log,
             asks,
             options,
@@ -244,7 +244,7 @@ impl Runner {
         let cell = self.cells[at].clone();
         let plan = self.router.executors[at].plan.clone();
         let (clock, directory, witness) = (self.clock, self.directory.clone(), self.witness.clone());
-        let log = self.spare_readers.pop();
+        let log = self.spare_logs.pop();
         let thread = std::thread::Builder::new()
             .name(format!("sinew-{}", plan.name))
             .spawn(move || thread_main(&cell, number, &plan, clock, log, directory, &witness))

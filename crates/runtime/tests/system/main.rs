@@ -193,6 +193,24 @@ fn an_agent_that_dies_again_and_again_is_left_dead() {
 }
 
 #[test]
+fn a_filter_for_every_third_message_counts_each_message_once() {
+    for (test, wires) in [("every-alone", 1), ("every-beside", 2)] {
+        let mut plan = chain(test);
+        let to_relay = plan.wires.iter_mut().find(|wire| wire.to == "relay.from").unwrap();
+        to_relay.filter.every = 3;
+        if wires == 2 {
+            // A second route takes the other way through the output.
+            plan.add::<Sink>("beside", sink("nobody asks"));
+            plan.on("beside", "count");
+            plan.wires.push(WirePlan::new("source.out", "beside.count"));
+        }
+        Simulation::new(&plan, &types(), options(100)).unwrap().run().unwrap();
+        let numbers: Vec<i64> = heard(test).iter().map(|(_, twist)| twist.linear as i64).collect();
+        assert_eq!(numbers, [1, 4, 7, 10], "{test}");
+    }
+}
+
+#[test]
 fn an_output_misbehaves_as_it_is_asked_to() {
     let mut plan = chain("faults");
     let faults = ["stuck", "ok", "delayed", "ok", "off", "ok"];
