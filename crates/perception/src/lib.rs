@@ -26,3 +26,16 @@ pub mod sonar;
 pub mod target;
 
 pub use picture::{Size, WrongLength};
+
+/// What tests of several modules share.
+#[cfg(test)]
+mod test {
+    use proptest::strategy::Strategy;
+
+    /// Numbers of a range in single precision.
+    ///
+    /// They are drawn in double precision: proptest's own ranges of `f32` fail an assertion of theirs once in some ten million draws.
+    pub(crate) fn single(range: core::ops::Range<f64>) -> impl Strategy<Value = f32> {
+        range.prop_map(|x| x as f32)
+    }
+}

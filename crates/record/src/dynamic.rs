@@ -343,7 +343,8 @@ mod tests {
                 let value = i64::try_from(n).map_or_else(|_| Value::Text(n.to_string()), Value::Int);
                 (integer(8, false), value)
             }),
-            (-1e30f32..1e30).prop_map(|x| (Kind::F32, Value::Float(shortest(x)))),
+            // Drawn in double precision: proptest's own ranges of `f32` fail an assertion of theirs once in some ten million draws.
+            (-1e30..1e30).prop_map(|x| (Kind::F32, Value::Float(shortest(x as f32)))),
             (-1e300..1e300).prop_map(|x| (Kind::F64, Value::Float(x))),
             "[a-zäöü ]{0,9}".prop_map(|text| (Kind::String(None), Value::Text(text))),
         ];
