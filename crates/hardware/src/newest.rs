@@ -56,11 +56,19 @@ impl<T> Newest<T> {
     pub(crate) fn read<R>(&self, look: impl Fn(&T) -> R) -> R {
         loop {
             let place = self.0.newest.load(Ordering::Acquire);
-            match self.0.places[place].try_lock() {
-                Ok(value) => return look(&value),
+            let value = match self.0.places[place].try_lock() {
+                Ok(value) => value,
                 // A writer that panicked left a value that is whole in memory, if old in parts.
-                Err(std::sync::TryLockError::Poisoned(value)) => return look(&value.into_inner()),
-                Err(std::sync::TryLockError::WouldBlock) => std::thread::yield_now(),
+                Err(std::sync::TryLockError::Poisoned(value)) => value.into_inner(),
+                Err(std::sync::TryLockError::WouldBlock) => {
+                    std::thread::yield_now();
+                    continue;
+                }
+            };
+            // The writer may have come round to this place and written what it has not yet published: whoever saw that would
+            // next see the value before it. While the lock is held the place stays what it is.
+            if self.0.newest.load(Ordering::Acquire) == place {
+                return look(&value);
             }
         }
     }
