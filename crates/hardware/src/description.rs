@@ -1,7 +1,7 @@
 //! What a robot is: sensors, mounts, limits, the kind of its clock.
 
 use motion::limits::Limits;
-use types::messages::{FrameTransform, Transforms};
+use types::messages::FrameTransform;
 use types::{Duration, Name, Pose};
 
 /// Which clock a driver keeps time with.
@@ -59,7 +59,7 @@ pub struct RobotDescription {
     /// Its sensors.
     pub periods: Periods,
     /// Where its sensors sit.
-    pub mounts: Transforms,
+    pub mounts: Vec<FrameTransform>,
     /// What its drive can do; nothing when it cannot be driven, and commands only leave a trace in the counts.
     pub limits: Option<Limits>,
     /// Sectors of its bumper, the first straight ahead, the others counter-clockwise.
@@ -81,7 +81,7 @@ impl RobotDescription {
             driver,
             clock,
             periods: Periods::default(),
-            mounts: Transforms::default(),
+            mounts: Vec::new(),
             limits: None,
             bumper_sectors: 0,
             head: None,
@@ -91,11 +91,11 @@ impl RobotDescription {
         }
     }
 
-    /// Adds the place of a sensor on the robot's body. What is beyond the capacity of a [`Transforms`] is left out.
+    /// Adds the place of a sensor on the robot's body.
     pub fn mount(&mut self, child: &str, base_from_child: Pose, z: f64) {
         let edge =
             FrameTransform { parent: Name::new(BASE), child: Name::new(child), pose: base_from_child, z };
-        let _ = self.mounts.edges.push(edge);
+        self.mounts.push(edge);
     }
 }
 

@@ -86,7 +86,7 @@ fn survey(path: &Path, robot: &str) -> Result<Survey, ReplayError> {
     let mut description = RobotDescription::bare("replay", ClockKind::Recorded);
     let (mut first, mut messages) = (None, 0);
     let mut others = std::collections::BTreeSet::new();
-    let (mut ranges, mut bytes) = (Vec::new(), Vec::new());
+    let (mut ranges, mut bytes, mut mounts) = (Vec::new(), Vec::new(), Vec::new());
     while let Some(logged) = reader.next_message()? {
         first.get_or_insert(logged.time);
         let Some((of, port)) = port_of(&logged.channel.topic) else { continue };
@@ -109,8 +109,8 @@ fn survey(path: &Path, robot: &str) -> Result<Survey, ReplayError> {
             Port::Head => &mut periods.head,
             Port::Pose => &mut periods.pose,
             Port::Transforms => {
-                if let Ok(mounts) = decode::<Transforms>(&logged.cdr, &mut Vec::new()) {
-                    description.mounts = mounts;
+                if decode::<Transforms>(&logged.cdr, &mut mounts).is_ok() {
+                    description.mounts.clone_from(&mounts);
                 }
                 continue;
             }
@@ -239,7 +239,7 @@ impl Replayed {
     fn mounted(&self, scan: LaserScan) -> LaserScan {
         let is_laser =
             |child: &types::Name| *child == scan.frame || (scan.frame.is_empty() && child.as_str() == LASER);
-        let edge = self.description.mounts.edges.iter().find(|edge| is_laser(&edge.child));
+        let edge = self.description.mounts.iter().find(|edge| is_laser(&edge.child));
         let pose = edge.map_or_else(Default::default, |edge| edge.pose);
         LaserScan {
             mount_x: pose.x as f32,

@@ -106,6 +106,7 @@ pub struct Robot {
     /// The poses that came with a recording, in the frame "log"; other robots have none.
     pose: Output<Odometry>,
     /// Where the sensors sit.
+    #[port(rows = 64)]
     transforms: Output<Transforms>,
     /// How to drive.
     drive: Input<Twist>,
@@ -143,6 +144,9 @@ impl Robot {
         }
         if self.image.has_listeners() && robot.picture > self.image.row_capacity() {
             return Err(Fault::new("a picture of this camera has more bytes than the port has room for"));
+        }
+        if robot.mounts.len() > self.transforms.row_capacity() {
+            return Err(Fault::new("this robot has more sensors than the port of the mounts has room for"));
         }
         Ok(())
     }
@@ -200,7 +204,11 @@ impl Agent for Robot {
         }
         if now >= self.next_mounts && self.transforms.has_listeners() {
             self.next_mounts = now + MOUNTS_EVERY;
-            self.transforms.send(gate.description().mounts);
+            let mounts = &gate.description().mounts;
+            self.transforms.send_with(|_, edges| {
+                edges[..mounts.len()].copy_from_slice(mounts);
+                mounts.len()
+            });
         }
         Ok(())
     }

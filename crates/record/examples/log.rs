@@ -43,7 +43,7 @@ fn main() -> Result<(), Box<dyn Error>> {
         z: 0.1,
         ..FrameTransform::default()
     };
-    put(&mut log, "/tf", time, &Transforms { edges: [edge].into_iter().collect() }, &[])?;
+    put(&mut log, "/tf", time, &Transforms, &[edge])?;
     let echo = Echo { x: 0.2, y: 0.0, bearing: 0.0, range: 1.25 };
     put(
         &mut log,

@@ -111,7 +111,6 @@ pub fn describe(model: &Model) -> RobotDescription {
         description.picture = camera.width as usize * camera.height as usize * 3;
     }
     for (k, place) in ring(model).into_iter().enumerate() {
-        // A frame tree has room for ten edges; the messages of the ring carry every place anyway.
         description.mount(&format!("sonar_{k}"), place, model.sonar.map_or(0.0, |sonar| sonar.height));
     }
     description.limits = Some(limits(model));

@@ -76,7 +76,7 @@ fn fr079_has_1464_scans_of_360_beams_and_no_bad_line() {
     let report = recording.report.clone();
     assert_eq!((report.scans, report.bad, report.odometry, report.backwards), (1464, 0, 0, 0));
     assert_eq!(report.other, 1464 + 2307, "VERTEX2 and EDGE2");
-    let laser = recording.description.mounts.edges[0];
+    let laser = recording.description.mounts[0];
     assert_eq!(
         (laser.child.as_str(), laser.pose.x, laser.pose.y, laser.pose.heading),
         ("laser", -0.04, 0.0, 0.0)

@@ -9,7 +9,9 @@ use hardware::simulated::{self, Robot as Body};
 use hardware::{Driver, Listening, Sink};
 use record::log::{ChannelId, RunInfo, Writer};
 use sim::{Model, WorldPlan};
-use types::messages::{Battery, Bumper, Echoes, Gyro, Head, Image, LaserScan, Transforms, Twist, WheelTicks};
+use types::messages::{
+    Battery, Bumper, Echoes, FrameTransform, Gyro, Head, Image, LaserScan, Transforms, Twist, WheelTicks,
+};
 use types::{Duration, Header, Message, Pose, Time};
 
 /// What was heard: the port, the stamp, the bytes as they go to other programs.
@@ -72,7 +74,7 @@ fn driven() -> (simulated::Simulated, Heard) {
     (driver, heard.0)
 }
 
-fn log(name: &str, heard: &Heard, mounts: &Transforms) -> PathBuf {
+fn log(name: &str, heard: &Heard, mounts: &[FrameTransform]) -> PathBuf {
     let path = std::env::temp_dir().join(format!("hardware-replay-{}-{name}.mcap", std::process::id()));
     let mut writer =
         Writer::create(&path, &RunInfo { system: "replayed".into(), ..RunInfo::default() }).unwrap();
@@ -88,7 +90,7 @@ fn log(name: &str, heard: &Heard, mounts: &Transforms) -> PathBuf {
     definitions.insert("head", Head::definition());
     let channel = writer.channel("h1.transforms", &Transforms::definition()).unwrap();
     let mut out = types::cdr::Writer::new();
-    mounts.encode(&[], Time::ZERO, &mut out);
+    Transforms.encode(mounts, Time::ZERO, &mut out);
     writer.write(channel, &Header::default(), Time::ZERO, out.bytes()).unwrap();
     for (port, stamp, cdr) in heard {
         let channel = *channels

@@ -72,7 +72,11 @@ impl Agent for Ears {
         }
         counts[2] += std::iter::from_fn(|| self.ticks.take().map(|_| ())).count() as u32;
         counts[3] += std::iter::from_fn(|| self.gyro.take().map(|_| ())).count() as u32;
-        counts[4] += std::iter::from_fn(|| self.transforms.take().map(|_| ())).count() as u32;
+        while let Some(transforms) = self.transforms.take() {
+            // Twelve sonars and the camera.
+            assert_eq!(transforms.row().len(), 13);
+            counts[4] += 1;
+        }
         Ok(())
     }
 }

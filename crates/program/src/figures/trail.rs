@@ -196,9 +196,8 @@ impl Trail {
 
     /// Where the laser sits. A scan does not say it.
     fn mounts(&mut self, message: &Message) {
-        let Some((tree, _)) = decode::<Transforms>(message) else { return };
-        if let Some(edge) = tree.edges.iter().find(|edge| edge.child.as_str() == hardware::description::LASER)
-        {
+        let Some((_, edges)) = decode::<Transforms>(message) else { return };
+        if let Some(edge) = edges.iter().find(|edge| edge.child.as_str() == hardware::description::LASER) {
             self.laser = edge.pose;
         }
     }

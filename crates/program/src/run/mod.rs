@@ -276,6 +276,8 @@ fn clock_name(clock: ClockChoice) -> &'static str {
 mod tests {
     use super::*;
     use record::log::Reader;
+    use types::Message as _;
+    use types::messages::Transforms;
 
     /// Ten seconds of the scenario with a log; gives the log's bytes.
     fn log_of(seed: u64, folder: &Path) -> Vec<u8> {
@@ -308,11 +310,19 @@ mod tests {
         let mut reader = Reader::open(folder.join("7.mcap")).unwrap();
         let mut counts = std::collections::BTreeMap::new();
         let mut last = types::Time::ZERO;
+        let (mut edges, mut mounted) = (Vec::new(), std::collections::BTreeSet::new());
         while let Some(message) = reader.next_message().unwrap() {
             *counts.entry(message.channel.topic.clone()).or_insert(0) += 1;
             if message.channel.topic == "/truth/h1" {
                 assert!(message.time >= last, "the truth is in order");
                 last = message.time;
+            }
+            if message.channel.topic == "/tf" {
+                edges.clear();
+                let mut cdr = types::cdr::Reader::new(&message.cdr).unwrap();
+                Transforms::decode(&mut cdr, &mut edges).unwrap();
+                let of_base = edges.iter().filter(|edge| edge.parent.as_str() == "base_link");
+                mounted.extend(of_base.map(|edge| edge.child.as_str().to_owned()));
             }
         }
         std::fs::remove_dir_all(&folder).unwrap();
@@ -322,6 +332,9 @@ mod tests {
             (109..=113).contains(&counts["/tf"]),
             "the mounts each second, the body ten times: {counts:?}"
         );
+        let sonars: Vec<String> = (0..12).map(|k| format!("sonar_{k}")).collect();
+        let missing: Vec<&String> = sonars.iter().filter(|sonar| !mounted.contains(*sonar)).collect();
+        assert!(missing.is_empty() && mounted.contains("camera"), "{missing:?} are not in {mounted:?}");
         assert_eq!(counts["/sonar/filtered"], 41);
         assert!(!counts.contains_key("/h1/image"));
     }

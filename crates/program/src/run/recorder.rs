@@ -178,10 +178,9 @@ impl LogFile {
         let Ok(Odometry { frame, body, pose, .. }) = decoded else { return };
         self.places.insert(output.to_owned(), stamp + PLACES);
         let edge = FrameTransform { parent: frame, child: body, pose, z: 0.0 };
-        let tree = Transforms { edges: [edge].into_iter().collect() };
         let mut scratch = std::mem::take(&mut self.scratch);
         scratch.clear();
-        tree.encode(&[] as &[NoElement], stamp, &mut scratch);
+        Transforms.encode(&[edge], stamp, &mut scratch);
         self.write(TREE, &describe::<Transforms>, header, scratch.bytes());
         self.scratch = scratch;
     }

@@ -5,11 +5,11 @@ use alloc::vec::Vec;
 use libm::{cos, sin};
 
 use super::Twist;
-use crate::cdr::{Error, Field as _, NoElement, Reader, Writer};
+use crate::cdr::{Element, Error, Field, NoElement, Reader, Writer};
 use crate::definition::{Definition, Kind};
 use crate::geometry::{Pose, wrap};
 use crate::message::{Message, ros};
-use crate::text::{Name, Sequence};
+use crate::text::Name;
 use crate::time::{Duration, Time};
 
 /// Where a robot believes to be and how it moves; to ROS 2 a `nav_msgs/Odometry`.
@@ -129,63 +129,74 @@ pub struct FrameTransform {
     pub z: f64,
 }
 
-/// A part of the frame tree; to ROS 2 a `tf2_msgs/TFMessage`.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-#[repr(C)]
-pub struct Transforms {
-    /// The edges.
-    pub edges: Sequence<FrameTransform, 10>,
-}
-
-impl Message for Transforms {
-    type Element = NoElement;
-    const NAME: &'static str = "tf2_msgs/msg/TFMessage";
-
+impl FrameTransform {
     fn definition() -> Definition {
         let transform = Definition::new(
             "geometry_msgs/msg/Transform",
             [("translation", Kind::Struct(ros::vector())), ("rotation", Kind::Struct(ros::quaternion()))],
         );
-        let stamped = Definition::new(
+        Definition::new(
             "geometry_msgs/msg/TransformStamped",
             [
                 ("header", Kind::Struct(ros::header())),
                 ("child_frame_id", Kind::String),
                 ("transform", Kind::Struct(transform)),
             ],
-        );
-        Definition::new(Self::NAME, [("transforms", Kind::Sequence(Kind::Struct(stamped).into()))])
+        )
     }
 
-    fn encode(&self, _: &[NoElement], stamp: Time, out: &mut Writer) {
-        out.put(self.edges.len() as u32);
-        for edge in self.edges.iter() {
-            out.header(stamp, edge.parent.as_str());
-            out.text(edge.child.as_str());
-            out.put(edge.pose.x).put(edge.pose.y).put(edge.z);
-            write_planar_rotation(edge.pose.heading, out);
-        }
+    fn write_at(&self, stamp: Time, out: &mut Writer) {
+        out.header(stamp, self.parent.as_str());
+        out.text(self.child.as_str());
+        out.put(self.pose.x).put(self.pose.y).put(self.z);
+        write_planar_rotation(self.pose.heading, out);
+    }
+}
+
+impl Field for FrameTransform {
+    fn kind() -> Kind {
+        Kind::Struct(FrameTransform::definition())
     }
 
-    fn decode(input: &mut Reader<'_>, _: &mut Vec<NoElement>) -> Result<Transforms, Error> {
-        let at = input.offset();
-        let len = input.len(1)?;
-        let mut edges = Sequence::new();
-        for _ in 0..len {
-            let (_, parent) = input.header()?;
-            let parent = Name::new(parent);
-            let child = Name::new(input.text()?);
-            let (x, y, z): (f64, f64, f64) = (input.get()?, input.get()?, input.get()?);
-            input.skip_f64(2)?;
-            let (qz, qw): (f64, f64) = (input.get()?, input.get()?);
-            let pose = Pose { x, y, heading: wrap(2.0 * libm::atan2(qz, qw)) };
-            let room = edges.capacity();
-            edges.push(FrameTransform { parent, child, pose, z }).map_err(|_| Error::TooLong {
-                at,
-                len,
-                room,
-            })?;
+    fn write(&self, out: &mut Writer) {
+        self.write_at(Time::ZERO, out);
+    }
+
+    fn read(input: &mut Reader<'_>) -> Result<FrameTransform, Error> {
+        let (_, parent) = input.header()?;
+        let parent = Name::new(parent);
+        let child = Name::new(input.text()?);
+        let (x, y, z): (f64, f64, f64) = (input.get()?, input.get()?, input.get()?);
+        input.skip_f64(2)?;
+        let (qz, qw): (f64, f64) = (input.get()?, input.get()?);
+        let pose = Pose { x, y, heading: wrap(2.0 * libm::atan2(qz, qw)) };
+        Ok(FrameTransform { parent, child, pose, z })
+    }
+}
+
+impl Element for FrameTransform {}
+
+/// A part of the frame tree: its edges are the row behind it; to ROS 2 a `tf2_msgs/TFMessage`.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Transforms;
+
+impl Message for Transforms {
+    type Element = FrameTransform;
+    const NAME: &'static str = "tf2_msgs/msg/TFMessage";
+
+    fn definition() -> Definition {
+        Definition::new(Self::NAME, [("transforms", Kind::Sequence(FrameTransform::kind().into()))])
+    }
+
+    fn encode(&self, edges: &[FrameTransform], stamp: Time, out: &mut Writer) {
+        out.put(edges.len() as u32);
+        edges.iter().for_each(|edge| edge.write_at(stamp, out));
+    }
+
+    fn decode(input: &mut Reader<'_>, edges: &mut Vec<FrameTransform>) -> Result<Transforms, Error> {
+        for _ in 0..input.len(1)? {
+            edges.push(input.get()?);
         }
-        Ok(Transforms { edges })
+        Ok(Transforms)
     }
 }
