@@ -1,13 +1,13 @@
 //! The laser agent: a scan becomes the same ranges around the robot that a ring of sonars gives.
 
 use perception::laser::{Beams, SaltParams, reduce, remove_salt};
-use perception::sonar::{RiskParams, risk};
+use perception::sonar::RiskParams;
 use runtime::{Agent, Envelope, Fault, Input, Output, Step};
+use types::Pose;
 use types::messages::{DIRECTIONS, LaserScan, Ranges, Risk};
 use types::params::Params;
-use types::{Pose, Time};
 
-use crate::shared::blank;
+use crate::shared::{Before, blank};
 
 /// The longest scan that is taken (beams).
 pub const BEAMS_MAX: usize = 4096;
@@ -63,13 +63,14 @@ pub struct Laser {
     risk: Output<Risk>,
     params: LaserParams,
     reduction: Reduction,
+    before: Before,
 }
 
 impl Agent for Laser {
     fn step(&mut self, _: &mut Step) -> Result<(), Fault> {
         let Some(scan) = self.scan.newest() else { return Ok(()) };
         if !self.ranges.has_listeners() && !self.risk.has_listeners() {
-            self.reduction.before = None;
+            self.before = Before::default();
             return Ok(());
         }
         let stamp = scan.header().stamp;
@@ -77,7 +78,7 @@ impl Agent for Laser {
         let ranges = self.reduction.ranges(&self.params, &scan, scan.row())?;
         self.ranges.send_as(envelope, ranges);
         if self.risk.has_listeners() {
-            let risk = self.reduction.risk(&self.params, ranges, stamp)?;
+            let risk = self.before.risk(ranges, stamp, &self.params.risk()).ok_or(TOO_LONG)?;
             self.risk.send_as(envelope, risk);
         }
         Ok(())
@@ -87,12 +88,11 @@ impl Agent for Laser {
 /// The buffers of the reduction, made with the agent so that a step needs no memory.
 struct Reduction {
     clean: Vec<f32>,
-    before: Option<(Time, Ranges)>,
 }
 
 impl Default for Reduction {
     fn default() -> Reduction {
-        Reduction { clean: vec![0.0; BEAMS_MAX], before: None }
+        Reduction { clean: vec![0.0; BEAMS_MAX] }
     }
 }
 
@@ -126,18 +126,6 @@ impl Reduction {
             *range = if seen.sees(i) { *range } else { f32::NAN };
         }
         Ok(ranges)
-    }
-
-    fn risk(&mut self, params: &LaserParams, ranges: Ranges, stamp: Time) -> Result<Risk, Fault> {
-        let n = ranges.values.len();
-        let (then, before) =
-            self.before.filter(|(_, before)| before.values.len() == n).unwrap_or((stamp, ranges));
-        let mut out = Risk { angle_min: ranges.angle_min, angle_step: ranges.angle_step, ..Risk::default() };
-        out.values.resize(n);
-        let dt = (stamp - then).seconds();
-        risk(&before.values, &ranges.values, dt, &params.risk(), &mut out.values).map_err(|_| TOO_LONG)?;
-        self.before = Some((stamp, ranges));
-        Ok(out)
     }
 }
 

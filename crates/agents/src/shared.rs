@@ -2,8 +2,9 @@
 
 use motion::fusion::SHARES_MAX;
 use motion::ring::Ring;
+use perception::sonar::{RiskParams, risk};
 use types::geometry::TAU;
-use types::messages::{Offer, Ranges};
+use types::messages::{Offer, Ranges, Risk};
 use types::{AgentId, Duration, Time};
 
 /// The frame of the robot's body, at whose origin all distances begin.
@@ -39,6 +40,35 @@ pub(crate) fn blank(directions: usize, range_min: f32, range_max: f32) -> Ranges
     ranges.values.resize(directions);
     ranges.values.fill(f32::NAN);
     ranges
+}
+
+/// The reading before, to see what approaches.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Before(Option<(Time, Ranges)>);
+
+impl Before {
+    /// The reading before, and the time since then (s). A ring of other directions is none.
+    fn of(&self, ranges: &Ranges, stamp: Time) -> Option<(f64, &Ranges)> {
+        let (then, before) =
+            self.0.as_ref().filter(|(_, before)| before.values.len() == ranges.values.len())?;
+        Some(((stamp - *then).seconds(), before))
+    }
+
+    /// The time since the reading before (s); zero where there is none.
+    pub(crate) fn since(&self, ranges: &Ranges, stamp: Time) -> f64 {
+        self.of(ranges, stamp).map_or(0.0, |(dt, _)| dt)
+    }
+
+    /// The risk in each direction, from the change since the reading before; `ranges` takes its place. Nothing where the
+    /// algorithm has no room for so many directions.
+    pub(crate) fn risk(&mut self, ranges: Ranges, stamp: Time, params: &RiskParams) -> Option<Risk> {
+        let (dt, before) = self.of(&ranges, stamp).unwrap_or((0.0, &ranges));
+        let mut out = Risk { angle_min: ranges.angle_min, angle_step: ranges.angle_step, ..Risk::default() };
+        out.values.resize(ranges.values.len());
+        risk(&before.values, &ranges.values, dt, params, &mut out.values).ok()?;
+        self.0 = Some((stamp, ranges));
+        Some(out)
+    }
 }
 
 /// A value and the time that it speaks of.
@@ -130,6 +160,21 @@ mod tests {
         assert_eq!((offers.len, offers.turned_away), (SHARES_MAX, 1), "the first made room");
         offers.forget_expired(Time::ZERO + Duration::millis(51));
         assert_eq!(offers.len, 0);
+    }
+
+    #[test]
+    fn what_has_other_directions_is_not_the_reading_before() {
+        let (mut before, params) = (Before::default(), RiskParams::default());
+        let later = Time::ZERO + Duration::millis(250);
+        let (four, five) = (blank(4, 0.1, 5.0), blank(5, 0.1, 5.0));
+        assert_eq!(before.since(&four, later), 0.0, "there is none");
+        let risk = before.risk(four, Time::ZERO, &params).unwrap();
+        assert_eq!(
+            (risk.values.len(), before.since(&four, later), before.since(&five, later)),
+            (4, 0.25, 0.0)
+        );
+        assert_eq!(before.risk(five, later, &params).unwrap().values.len(), 5);
+        assert_eq!((before.since(&four, later), before.since(&five, later)), (0.0, 0.0));
     }
 
     #[test]

@@ -7,13 +7,13 @@
 //! ```
 
 use libm::{cos, hypot, sin};
-use perception::sonar::{FilterParams, RiskParams, SonarFilter, risk};
+use perception::sonar::{FilterParams, RiskParams, SonarFilter};
 use runtime::{Agent, Envelope, Fault, Input, Output, Step};
 use types::messages::{Echo, Echoes, Ranges, Risk};
 use types::params::Params;
 use types::{Time, geometry::TAU};
 
-use crate::shared::blank;
+use crate::shared::{Before, blank};
 
 /// How echoes are filtered and when a direction is risky.
 #[derive(Clone, Debug, Params)]
@@ -130,12 +130,12 @@ pub fn around_centre(echoes: &Echoes) -> Ranges {
 #[derive(Clone, Debug)]
 struct Chain {
     filter: SonarFilter,
-    before: Option<(Time, Ranges)>,
+    before: Before,
 }
 
 impl Default for Chain {
     fn default() -> Chain {
-        Chain { filter: SonarFilter::new(FilterParams::default()), before: None }
+        Chain { filter: SonarFilter::new(FilterParams::default()), before: Before::default() }
     }
 }
 
@@ -148,20 +148,15 @@ impl Chain {
         let closed =
             raw.values.iter().all(|range| !range.is_nan()) && n as f32 * raw.angle_step > 0.99 * TAU as f32;
         self.filter.set_params(params.filter(&raw, closed));
-        let earlier = self.before.filter(|(_, before)| before.values.len() == n);
-        let dt = earlier.map_or(0.0, |(then, _)| (stamp - then).seconds());
+        let dt = self.before.since(&raw, stamp);
         let mut filtered = raw;
         self.filter.update(&raw.values, dt, &mut filtered.values).map_err(|_| TOO_MANY)?;
         for (out, raw) in filtered.values.iter_mut().zip(raw.values.iter()) {
             // The filter takes an unknown direction for a free one.
             *out = if raw.is_nan() { f32::NAN } else { *out };
         }
-        let mut out = Risk { angle_min: raw.angle_min, angle_step: raw.angle_step, ..Risk::default() };
-        out.values.resize(n);
-        let (_, before) = earlier.unwrap_or((stamp, filtered));
-        risk(&before.values, &filtered.values, dt, &params.risk(), &mut out.values).map_err(|_| TOO_MANY)?;
-        self.before = Some((stamp, filtered));
-        Ok((filtered, out))
+        let risk = self.before.risk(filtered, stamp, &params.risk()).ok_or(TOO_MANY)?;
+        Ok((filtered, risk))
     }
 }
 
