@@ -6,13 +6,13 @@ use std::os::unix::net::UnixStream;
 use std::path::Path;
 use std::time::{Duration, Instant};
 
-use runtime::Refusal;
+use runtime::{FolderError, Refusal, RunFolder};
 use serde_json::Value as Json;
 use types::value::nearest;
 
-use crate::folder::{FolderError, RunFolder};
 use crate::lines::{Lines, NoLine};
 use crate::protocol::{LONGEST_LINE, Question, VERSION};
+use crate::sockets::{socket_of, sockets_in};
 
 /// Why a running system cannot be asked, or does not do what was asked.
 #[derive(Debug, thiserror::Error)]
@@ -123,7 +123,7 @@ impl Client {
     /// As [`connect`](Self::connect).
     pub fn connect_in(folder: &RunFolder, system: Option<&str>) -> Result<Client, ClientError> {
         if let Some(name) = system {
-            return match Client::at(&folder.socket(name)) {
+            return match Client::at(&socket_of(folder, name)) {
                 Err(ClientError::Io(error)) if is_nobody(&error) => Err(unknown(name, &running(folder)?)),
                 connected => connected,
             };
@@ -271,7 +271,7 @@ impl Client {
 /// Connections to all systems that run, in the order of their names. Sockets of dead ones are passed over.
 fn running(folder: &RunFolder) -> Result<Vec<Client>, ClientError> {
     let mut clients = Vec::new();
-    for path in folder.sockets()? {
+    for path in sockets_in(folder)? {
         match Client::at(&path) {
             Ok(client) => clients.push(client),
             Err(ClientError::Io(error)) if is_nobody(&error) => {}

@@ -1,17 +1,14 @@
 //! What each command does.
 
-use std::collections::HashMap;
-use std::sync::mpsc::{Receiver, sync_channel};
-use std::sync::{Arc, Mutex, PoisonError};
-use std::time::{Duration, Instant};
+use std::sync::Arc;
 
-use runtime::{Control, Heard, Refusal, Request, owner};
+use runtime::{Control, Refusal, Request};
 use serde_json::{Value as Json, json};
 use types::value::{Table, Value};
 
 use crate::json::{from_json, table_to_json};
 use crate::outbox::Outbox;
-use crate::protocol::{COMMANDS, Question};
+use crate::protocol::{COMMANDS, LONGEST_CALL, Question};
 use crate::server::Hooks;
 use crate::shapes;
 use crate::taps::{Ear, Taps};
@@ -21,29 +18,13 @@ use crate::words::{self, CHANGES, Pairs};
 const DECISIONS: usize = 10;
 /// How long a call waits for its answer when nobody says.
 const CALL_WAITS: types::Duration = types::Duration::secs(2);
-/// How long a call waits at most: others who call the same service wait with it.
-const LONGEST_CALL: types::Duration = types::Duration::secs(60);
-/// How long an answer that did not come in time keeps others from calling the same service: it would be taken for theirs.
-const LATE_ANSWER: Duration = Duration::from_secs(30);
-
 type Answer = Result<Json, Refusal>;
-
-/// A call whose answer did not come in time.
-struct Late {
-    answer: Receiver<Heard>,
-    since: Instant,
-}
-
-/// One call of a service from outside at a time.
-type Calling = Arc<Mutex<Option<Late>>>;
 
 /// Does what clients ask.
 pub(crate) struct Commands {
     control: Control,
     hooks: Arc<dyn Hooks>,
     taps: Arc<Taps>,
-    /// The services that were called. Calls from outside carry no marker of their own, so each service gets one at a time.
-    calling: Mutex<HashMap<String, Calling>>,
 }
 
 /// Who asks.
@@ -54,7 +35,7 @@ pub(crate) struct Asker {
 
 impl Commands {
     pub(crate) fn new(control: Control, hooks: Arc<dyn Hooks>, taps: Arc<Taps>) -> Commands {
-        Commands { control, hooks, taps, calling: Mutex::default() }
+        Commands { control, hooks, taps }
     }
 
     /// Does what is asked, and says what came of it.
@@ -130,8 +111,7 @@ impl Commands {
         let mut pairs = Pairs::read("tap", rest)?;
         let every = pairs.number::<u64>("every")?.unwrap_or(1).max(1);
         pairs.finish("tap", &["every"])?;
-        let ear =
-            Ear::Client { client: asker.client, outbox: asker.outbox.clone(), every, heard: 0, lost: 0 };
+        let ear = Ear { client: asker.client, outbox: asker.outbox.clone(), every, heard: 0, lost: 0 };
         let definition = self.taps.listen(port, ear)?;
         Ok(json!({"port": port, "message": definition.name, "definition": definition.text()}))
     }
@@ -161,85 +141,18 @@ impl Commands {
         self.hooks.encode(&self.taps.definition(port)?, message).map_err(Refusal::new)
     }
 
-    /// Calls a service. A call goes out of a client that is wired to it, without a marker: those of the client itself always
-    /// have one, so each answer finds its own.
+    /// Calls a service, and waits for the answer on the thread of the client who asked.
     fn call(&self, rest: &[String], message: Option<&Json>) -> Answer {
         let (service, rest) = port("call", rest)?;
-        let (within, rest): (Vec<&String>, Vec<&String>) =
-            rest.iter().partition(|word| word.starts_with("within="));
-        let within: Vec<String> = within.into_iter().cloned().collect();
-        let rest: Vec<String> = rest.into_iter().cloned().collect();
+        let (within, rest): (Vec<String>, Vec<String>) =
+            rest.iter().cloned().partition(|word| word.starts_with("within="));
         let within = Pairs::read("call", &within)?.span("within")?.unwrap_or(CALL_WAITS).min(LONGEST_CALL);
-        let client = self.client_of(service)?;
-        let question = self.encode(&client, &message_of("call", &rest, message)?)?;
-
-        let calling = self
-            .calling
-            .lock()
-            .unwrap_or_else(PoisonError::into_inner)
-            .entry(service.to_owned())
-            .or_default()
-            .clone();
-        let mut late = calling.lock().unwrap_or_else(PoisonError::into_inner);
-        self.settle(&mut late, service)?;
-        let (sender, answer) = sync_channel(1);
-        let definition = self.taps.listen(service, Ear::Call(sender))?;
-        let sent = self.control.request(Request::Send { port: client, cdr: question });
-        let heard = sent.map(|()| answer.recv_timeout(Duration::from_nanos(within.0.max(0) as u64)));
-        if let Ok(Err(_)) = heard {
-            #[expect(
-                clippy::disallowed_methods,
-                reason = "how long a client waits is a matter of the host's clock"
-            )]
-            let since = Instant::now();
-            *late = Some(Late { answer, since });
-            return Err(
-                Refusal::new(format!("{service} did not answer within {within}")).help(look_at(service))
-            );
-        }
-        self.taps.end_call(service);
-        match heard? {
-            Ok(heard) => self.hooks.decode(&definition, &heard.cdr).map_err(Refusal::new),
-            Err(_) => Err(Refusal::new("the system has ended")),
-        }
+        let shape = self.control.service(service)?;
+        let question = message_of("call", &rest, message)?;
+        let question = self.hooks.encode(&shape.question, &question).map_err(Refusal::new)?;
+        let answer = self.control.call(service, question, within)?;
+        self.hooks.decode(&shape.answer, &answer).map_err(Refusal::new)
     }
-
-    /// The client that is wired to a service.
-    fn client_of(&self, service: &str) -> Result<String, Refusal> {
-        let view = self.control.view()?;
-        let agent = view.agents.iter().find(|agent| agent.name == owner(service)).ok_or_else(|| {
-            Refusal::unknown("agent", owner(service), view.agents.iter().map(|agent| agent.name.as_str()))
-        })?;
-        let name = service.strip_prefix(&format!("{}.", agent.name)).unwrap_or_default();
-        let services = || agent.ports.iter().filter(|port| port.direction == runtime::Direction::Service);
-        if !services().any(|port| port.name == name) {
-            return Err(Refusal::unknown(
-                &format!("service of {}", agent.name),
-                name,
-                services().map(|port| port.name),
-            ));
-        }
-        view.wires.iter().find(|wire| wire.to == service).map(|wire| wire.from.clone()).ok_or_else(|| {
-            Refusal::new(format!("nobody is wired to {service}"))
-                .help("a call from outside goes out of a client that is: wire one first")
-        })
-    }
-
-    /// Refuses a call while the answer to the one before may still come and be taken for that of this one.
-    fn settle(&self, late: &mut Option<Late>, service: &str) -> Result<(), Refusal> {
-        let Some(call) = late else { return Ok(()) };
-        if call.answer.try_recv().is_err() && call.since.elapsed() < LATE_ANSWER {
-            let what = format!("{service} has not answered the call before this one");
-            return Err(Refusal::new(what).help(look_at(service)));
-        }
-        *late = None;
-        self.taps.end_call(service);
-        Ok(())
-    }
-}
-
-fn look_at(service: &str) -> String {
-    format!("see with \"ls\" whether {} runs", owner(service))
 }
 
 fn changes_agents(request: &Request) -> bool {

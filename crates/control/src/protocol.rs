@@ -2,7 +2,7 @@
 
 use runtime::{Heard, Refusal};
 use serde_json::{Value as Json, json};
-use types::{AgentId, Time};
+use types::{AgentId, Duration, Time};
 
 use crate::words;
 
@@ -11,6 +11,9 @@ pub const VERSION: u64 = 1;
 
 /// The longest line in bytes, in both directions.
 pub const LONGEST_LINE: usize = 1 << 20;
+
+/// How long a call of a service waits at most: a client that calls can ask nothing else meanwhile.
+pub const LONGEST_CALL: Duration = Duration::secs(60);
 
 /// The commands that ask or do something besides changing agents and wires.
 pub const COMMANDS: [words::Usage; 12] = [

@@ -21,15 +21,15 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::thread::{Builder, JoinHandle};
 use std::time::Duration;
 
-use runtime::{Control, Refusal};
+use runtime::{Control, Refusal, RunFolder};
 use serde_json::Value as Json;
 use types::definition::Definition;
 
 use crate::commands::{Asker, Commands};
-use crate::folder::RunFolder;
 use crate::lines::{Lines, NoLine};
 use crate::outbox::Outbox;
 use crate::protocol::{self, LONGEST_LINE, Question};
+use crate::sockets;
 use crate::taps::Taps;
 use crate::words::Usage;
 
@@ -250,11 +250,11 @@ fn bind(folder: &RunFolder, name: &str) -> Result<(String, PathBuf, UnixListener
         let path = path.to_owned();
         move |cause| ServerError::Socket { path, cause }
     };
-    let _lock = folder.lock().map_err(failed(folder.path()))?;
+    let _lock = sockets::lock(folder).map_err(failed(folder.path()))?;
     let mut number = 1;
     loop {
         let name = if number == 1 { name.to_owned() } else { format!("{name}-{number}") };
-        let path = folder.socket(&name);
+        let path = sockets::socket_of(folder, &name);
         match UnixStream::connect(&path) {
             Ok(_) => {
                 number += 1;

@@ -5,18 +5,19 @@
 //! | `ls` | `system`, `time_s`, `agents`: rows of `name`, `kind`, `state` (`running`, `restarting`, `dead`), `executor`, `asked`, `granted`, `period_s` (null without one), `deadline_s`, the counts, `last_death` (null when it never died), `params` |
 //! | `graph` | `system`, `time_s`, `agents`: rows of `name`, `kind`, `doc`, `executor`, `ports`: rows of `name`, `doc`, `direction` (`input`, `output`, `service`, `client`), `message`, `sent`; `wires`: rows of `from`, `to`, `message`, `depth`, `overload`, `filter`, `sent`, `taken`, `dropped`, `refused`, `expired` |
 //! | `top` | `system`, `time_s`, `messages`: `sent`, `taken`, `dropped`, `refused`, `expired` over all wires; `agents`: rows of `name`, `state`, `executor`, `asked`, `granted`, the counts, and the figures `exec`, `jitter`, `response` |
-//! | counts | `releases`, `missed`, `stalled`, `skipped`, `faults`, `panics`, `hangs`, `restarts` |
+//! | counts | `releases`, `missed`, `stalled`, `skipped`, `faults`, `panics`, `hangs`, `restarts`; of execution times `left_out` (a stall was in the step), `checked` (held against the clock of the thread) and `disagreed` |
 //! | figure | `name`, `unit`, `n`, `min`, `p50`, `p99`, `p999`, `max`: unfiltered; all values null while `n` is 0 |
-//! | filter | `category` (null for all), `priority` (the least), `marker`, `recipient` (null for all), `every` |
+//! | filter | `category` (null for all), `priority` (the least), `marker`, `recipient` (the name of an agent, null for all), `every` |
 //!
 //! `time_s` is the system's own clock (s). `asked` and `granted` are the scheduling, as in `fifo 70`. Whatever was asked for and
 //! not granted, dropped or missed is in these numbers.
 
 use runtime::{
-    AgentPlan, AgentView, Direction, Figure, PortView, Refusal, Request, SystemView, WirePlan, WireView,
+    AgentPlan, AgentView, Direction, Figure, PortView, Refusal, Request, SystemView, WireFilter, WirePlan,
+    WireView,
 };
 use serde_json::{Map, Value as Json, json};
-use types::{Duration, Filter};
+use types::Duration;
 
 use crate::json::table_to_json;
 use crate::words;
@@ -99,6 +100,9 @@ fn with_counts(mut row: Json, agent: &AgentView) -> Json {
         ("panics", counts.panics),
         ("hangs", counts.hangs),
         ("restarts", counts.restarts),
+        ("left_out", counts.left_out),
+        ("checked", counts.checked),
+        ("disagreed", counts.disagreed),
     ] {
         row[key] = count.into();
     }
@@ -151,11 +155,11 @@ fn graph_wire(wire: &WireView) -> Json {
     })
 }
 
-fn filter(filter: &Filter) -> Json {
+fn filter(filter: &WireFilter) -> Json {
     json!({
         "category": filter.category.map(|category| category.name()),
         "priority": filter.least_priority.0.name(), "marker": filter.marker,
-        "recipient": filter.recipient.map(|agent| agent.0), "every": filter.every.max(1),
+        "recipient": filter.recipient, "every": filter.every.max(1),
     })
 }
 

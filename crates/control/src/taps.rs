@@ -1,13 +1,12 @@
 //! Who listens to which output: one tap of the system for each output, however many clients listen.
 
 use std::collections::HashMap;
-use std::sync::mpsc::SyncSender;
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
 
 use runtime::{Control, Heard, Refusal, SystemView, Tap};
+use types::AgentId;
 use types::definition::Definition;
-use types::{AgentId, Category};
 
 use crate::outbox::Outbox;
 use crate::protocol::{lost_event, message_event};
@@ -16,18 +15,13 @@ use crate::server::Hooks;
 /// How often what was heard is passed on. A tap keeps 256 messages meanwhile, so up to 25 000 a second are heard.
 const EVERY: Duration = Duration::from_millis(10);
 
-/// Somebody who listens.
-pub(crate) enum Ear {
-    /// A client, who gets every n-th message as an event.
-    Client { client: u64, outbox: Arc<Outbox>, every: u64, heard: u64, lost: u64 },
-    /// A call from outside, who waits for the answer to it: the one without a marker.
-    Call(SyncSender<Heard>),
-}
-
-impl Ear {
-    fn is_of(&self, who: u64) -> bool {
-        matches!(self, Ear::Client { client, .. } if *client == who)
-    }
+/// A client who listens, and gets every n-th message as an event.
+pub(crate) struct Ear {
+    pub(crate) client: u64,
+    pub(crate) outbox: Arc<Outbox>,
+    pub(crate) every: u64,
+    pub(crate) heard: u64,
+    pub(crate) lost: u64,
 }
 
 struct Listened {
@@ -79,7 +73,7 @@ impl Taps {
         self.renew_in(&mut state, &view);
         let known = state.listened.iter_mut().find(|listened| listened.tap.name() == port);
         if let Some(listened) = known {
-            if matches!(ear, Ear::Client { client, .. } if listened.has_client(client)) {
+            if listened.has_client(ear.client) {
                 return Err(Refusal::new(format!("{port} is listened to already")));
             }
             listened.ears.push(ear);
@@ -99,7 +93,7 @@ impl Taps {
             return false;
         };
         let did = state.listened[at].has_client(client);
-        state.listened[at].ears.retain(|ear| !ear.is_of(client));
+        state.listened[at].ears.retain(|ear| ear.client != client);
         self.sweep(&mut state);
         did
     }
@@ -107,16 +101,7 @@ impl Taps {
     /// Ends all listening of a client that has gone.
     pub(crate) fn forget(&self, client: u64) {
         let mut state = self.state();
-        state.listened.iter_mut().for_each(|listened| listened.ears.retain(|ear| !ear.is_of(client)));
-        self.sweep(&mut state);
-    }
-
-    /// Ends the listening of a call.
-    pub(crate) fn end_call(&self, port: &str) {
-        let mut state = self.state();
-        for listened in state.listened.iter_mut().filter(|listened| listened.tap.name() == port) {
-            listened.ears.retain(|ear| !matches!(ear, Ear::Call(_)));
-        }
+        state.listened.iter_mut().for_each(|listened| listened.ears.retain(|ear| ear.client != client));
         self.sweep(&mut state);
     }
 
@@ -186,31 +171,21 @@ impl Taps {
         let Listened { tap, ears, .. } = listened;
         // The line is made for the first who wants it.
         let mut line: Option<Arc<str>> = None;
-        for ear in ears {
-            match ear {
-                Ear::Client { outbox, every, heard: count, lost, .. } => {
-                    *count += 1;
-                    if !(*count - 1).is_multiple_of(*every) {
-                        continue;
-                    }
-                    let line = line.get_or_insert_with(|| {
-                        let message = self.hooks.decode(tap.definition(), &heard.cdr);
-                        message_event(tap.name(), heard, message, |id| self.name(names, id)).into()
-                    });
-                    // What was lost is told together with the next message that has room.
-                    let told = match *lost {
-                        0 => outbox.offer(line),
-                        n => outbox.offer(&format!("{}\n{line}", lost_event(tap.name(), n)).into()),
-                    };
-                    *lost = if told { 0 } else { *lost + 1 };
-                }
-                Ear::Call(answer) => {
-                    if heard.header.category == Category::Answer && heard.header.marker == 0 {
-                        // Only one answer is wanted; who waited for it may be gone.
-                        let _ = answer.try_send(heard.clone());
-                    }
-                }
+        for Ear { outbox, every, heard: count, lost, .. } in ears {
+            *count += 1;
+            if !(*count - 1).is_multiple_of(*every) {
+                continue;
             }
+            let line = line.get_or_insert_with(|| {
+                let message = self.hooks.decode(tap.definition(), &heard.cdr);
+                message_event(tap.name(), heard, message, |id| self.name(names, id)).into()
+            });
+            // What was lost is told together with the next message that has room.
+            let told = match *lost {
+                0 => outbox.offer(line),
+                n => outbox.offer(&format!("{}\n{line}", lost_event(tap.name(), n)).into()),
+            };
+            *lost = if told { 0 } else { *lost + 1 };
         }
     }
 
@@ -227,14 +202,12 @@ impl Taps {
 
 impl Listened {
     fn has_client(&self, client: u64) -> bool {
-        self.ears.iter().any(|ear| ear.is_of(client))
+        self.ears.iter().any(|ear| ear.client == client)
     }
 
     fn add_lost(&mut self, more: u64) {
         for ear in &mut self.ears {
-            if let Ear::Client { lost, .. } = ear {
-                *lost += more;
-            }
+            ear.lost += more;
         }
     }
 }

@@ -155,6 +155,10 @@ fn failure(error: ClientError) -> Failure {
     }
 }
 
+/// A little longer than the system lets a call wait.
+const LONGEST_CALL_WAITS: HostDuration = HostDuration::from_nanos(control::protocol::LONGEST_CALL.0 as u64)
+    .saturating_add(HostDuration::from_secs(5));
+
 fn said(verb: &str, words: &[String], which: &Which, json: bool) -> Result<ExitCode, Failure> {
     let all: Vec<String> = std::iter::once(verb.to_owned()).chain(words.iter().cloned()).collect();
     if control::words::CHANGES.iter().any(|usage| usage.verb == verb) && verb != "send" {
@@ -162,6 +166,10 @@ fn said(verb: &str, words: &[String], which: &Which, json: bool) -> Result<ExitC
         control::words::parse(&all)?;
     }
     let mut client = connect(which)?;
+    if verb == "call" {
+        // The system says itself when no answer comes in time.
+        client.set_time_out(LONGEST_CALL_WAITS);
+    }
     let answer = ask(&mut client, &all)?;
     if json {
         terminal::say_json(&json!({"system": client.system(), "answer": answer}));

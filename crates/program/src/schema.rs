@@ -219,10 +219,11 @@ fn wires() -> Json {
         ("priority", choice(Priority::ALL.map(Priority::name), "Only this priority or a higher one passes.")),
         ("marker", whole(0, "Only this marker passes.")),
         ("category", choice(Category::ALL.map(Category::name), "Only this category passes.")),
+        ("recipient", text("Only what is for this agent, or for everybody, passes.")),
     ];
     let target = json!({"anyOf": [{"$ref": "#/$defs/port"}, closed(rows, &["to"])]});
     // A name without quotes is a table in a table for TOML.
-    let nested = json!({"type": "object"});
+    let nested = json!({"type": "object", "not": {"required": ["to"]}});
     json!({
         "type": "object",
         "additionalProperties": {"anyOf": [target, {"type": "array", "items": target}, nested]},

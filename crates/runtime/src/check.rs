@@ -131,6 +131,12 @@ impl<'a> Checker<'a> {
     }
 
     fn wire(&mut self, wire: &WirePlan) {
+        if let Some(name) = &wire.filter.recipient
+            && self.plan.agent(name).is_none()
+        {
+            let known = self.plan.agents.iter().map(|agent| agent.name.as_str());
+            self.mistakes.push(Mistake::unknown(wire.at, "agent", name, known));
+        }
         let (from, to) = (self.end(&wire.from, wire.at), self.end(&wire.to, wire.at));
         let (Some((_, out_kind, out)), Some((_, in_kind, into))) = (from, to) else { return };
         let (out, into) = (&out_kind.ports[out].shape, &in_kind.ports[into].shape);

@@ -19,9 +19,9 @@ use crate::agent::{Body, Fault, Step};
 use crate::context::{Context, ReadySet};
 use crate::door::{CHANGES, Door};
 use crate::os;
-use crate::port::{InputEnd, OutputEnd, WireId};
+use crate::port::{Envelope, InputEnd, OutputEnd, WireId};
+use crate::processor::{Checks, Reading, Stopwatch, agrees};
 use crate::stats::{AgentStats, bump, nanos};
-use crate::witness::Witness;
 
 /// When an agent runs.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -44,7 +44,10 @@ pub(crate) struct Seat {
     pub timing: Timing,
     pub stats: Arc<AgentStats>,
     pub next_release: Time,
+    /// The step that the agent asked for.
     pub alarm: Time,
+    /// The step that a message asked for too soon after the last one: when it may be. The next step is that one, whatever for.
+    pub put_off: Time,
     pub last_step: Time,
     pub started: bool,
     pub fault: StepFault,
@@ -154,6 +157,7 @@ pub(crate) enum Change {
     Send {
         end: Arc<dyn OutputEnd>,
         message: Box<dyn Any + Send>,
+        envelope: Envelope,
     },
     /// Ends all agents.
     Stop,
@@ -189,6 +193,16 @@ pub(crate) struct Running {
     pub steps: AtomicU64,
 }
 
+/// The time of a step.
+struct Spent {
+    /// From its beginning to its end, in [`os::ticks`].
+    elapsed: u64,
+    /// What higher executors had of that.
+    others: u64,
+    /// What the thread's clock says (ns), where it was asked.
+    thread: Option<u64>,
+}
+
 /// An agent that is to run, and why.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Job {
@@ -212,6 +226,9 @@ pub(crate) struct Core {
     changes: rtrb::Consumer<Change>,
     answers: rtrb::Producer<Answer>,
     nanos_per_tick: f64,
+    checks: Checks,
+    /// How many stalls the witness had seen after the last step.
+    stalls: u64,
 }
 
 /// The control side's ends of an executor.
@@ -255,6 +272,8 @@ impl Core {
             changes,
             answers,
             nanos_per_tick: os::nanos_per_tick(),
+            checks: Checks::default(),
+            stalls: 0,
         };
         (core, Link { changes: change_in, answers: answer_out, door })
     }
@@ -310,9 +329,11 @@ impl Core {
             let Some(seat) = self.seats[slot as usize].as_mut() else { continue };
             let earliest = seat.last_step.saturating_add(seat.timing.min_gap);
             if seat.timing.min_gap > Duration::ZERO && earliest > now {
-                seat.alarm = seat.alarm.min(earliest);
-                let alarm = seat.alarm;
-                self.push_release(alarm, slot);
+                // One entry for all messages until then.
+                if seat.put_off != earliest {
+                    seat.put_off = earliest;
+                    self.push_release(earliest, slot);
+                }
                 continue;
             }
             return Some(Job { slot, release: now, deadline: now.saturating_add(seat.timing.deadline) });
@@ -344,6 +365,10 @@ impl Core {
                 release = release.or(Some(seat.alarm));
                 seat.alarm = Time::NEVER;
             }
+            if seat.put_off <= now {
+                release = release.or(Some(seat.put_off));
+                seat.put_off = Time::NEVER;
+            }
             if let Some(release) = release
                 && let Some(rank) = self.ready.rank_of(slot)
                 && !self.due.iter().any(|Reverse((_, _, known, _))| *known == slot)
@@ -362,13 +387,13 @@ impl Core {
                 seats
                     .get(*slot as usize)
                     .and_then(Option::as_ref)
-                    .is_some_and(|seat| seat.next_release == *time || seat.alarm == *time)
+                    .is_some_and(|seat| [seat.next_release, seat.alarm, seat.put_off].contains(time))
             });
         }
         self.releases.push(Reverse((time, slot)));
     }
 
-    /// Runs one step. `now` is the time that the agent sees. On the wall clock, where there is a witness, time goes on while it
+    /// Runs one step. `now` is the time that the agent sees. On the wall clock, where there is a stopwatch, time goes on while it
     /// runs; in simulated time it takes none.
     ///
     /// # Safety
@@ -379,10 +404,11 @@ impl Core {
         context: &Context,
         job: Job,
         now: Time,
-        witness: Option<&Witness>,
+        watch: Option<&Stopwatch<'_>>,
         still_mine: impl FnOnce() -> bool,
     ) -> Option<Ended> {
-        let (body, mut step, begun) = {
+        let read = || watch.map_or_else(Reading::of_time, Stopwatch::read);
+        let (body, mut step, checked, begun) = {
             // SAFETY: the caller owns the core; this borrow ends before the step.
             let core = unsafe { &mut *core };
             let Some(seat) = core.seats.get_mut(job.slot as usize).and_then(Option::as_mut) else {
@@ -407,17 +433,19 @@ impl Core {
             }
             let Some(body) = seat.body.take() else { return Some(Ended::NotRun) };
             seat.last_step = now;
+            seat.put_off = Time::NEVER;
             seat.stats.jitter.add(nanos(now - job.release));
             let (seat_id, seat_limit) = (seat.id, seat.timing.hang_after);
             let step = Step { now, deadline: job.deadline, agent: seat.id, period: seat.timing.period };
             context.begin(seat.id, now, core.number, &*core.ready);
-            let begun = os::ticks();
+            let checked = watch.and_then(|_| core.checks.begin(now));
+            let begun = read();
             core.running.limit.store(seat_limit.0 as u64, Ordering::Relaxed);
-            core.running.since.store(begun, Ordering::Relaxed);
+            core.running.since.store(begun.ticks, Ordering::Relaxed);
             core.running.steps.store(core.running.steps.load(Ordering::Relaxed) + 1, Ordering::Relaxed);
             core.running.agent.store(seat_id.0, Ordering::Relaxed);
             core.running.slot.store(job.slot + 1, Ordering::Relaxed);
-            (body, step, begun)
+            (body, step, checked, begun)
         };
         let (first, panics, taken) = {
             // SAFETY: as above.
@@ -443,7 +471,7 @@ impl Core {
             }
             body.step(&mut step)
         }));
-        let ended = os::ticks();
+        let ended = read();
         // First the step is published as ended, then it is asked whose the core is: the watchdog does it the other way round,
         // with a barrier on all processors between, so that one of the two sees the other.
         running.slot.store(0, Ordering::Release);
@@ -454,8 +482,13 @@ impl Core {
         }
         // SAFETY: the core is still this thread's.
         let core = unsafe { &mut *core };
+        let spent = Spent {
+            elapsed: begun.elapsed(&ended),
+            others: begun.others(&ended),
+            thread: checked.map(|before| os::thread_time().saturating_sub(before)),
+        };
         let alarm = context.end();
-        core.end(context, job, now, result, body, alarm, taken, (begun, ended), witness);
+        core.end(context, job, now, result, body, alarm, taken, spent, watch);
         Some(Ended::Normally)
     }
 
@@ -469,17 +502,34 @@ impl Core {
         mut body: Option<Box<dyn Body>>,
         alarm: Time,
         taken: u64,
-        (begun, ended): (u64, u64),
-        witness: Option<&Witness>,
+        spent: Spent,
+        watch: Option<&Stopwatch<'_>>,
     ) {
-        let took = (ended.saturating_sub(begun) as f64 * self.nanos_per_tick) as u64;
+        let took = (spent.elapsed as f64 * self.nanos_per_tick) as u64;
         let Some(seat) = self.seats.get_mut(job.slot as usize).and_then(Option::as_mut) else { return };
-        seat.stats.exec.add(took);
-        let end = if witness.is_some() { now + Duration(took as i64) } else { now };
+        let end = if watch.is_some() { now + Duration(took as i64) } else { now };
+        let stalls = watch.map_or(0, |watch| watch.witness.stalls());
+        // A step in which the processor stood still says nothing of how long it takes.
+        let stalled = stalls != self.stalls && {
+            self.stalls = stalls;
+            watch.is_some_and(|watch| watch.witness.saw_stall(now, end))
+        };
+        if stalled {
+            bump(&seat.stats.left_out);
+        } else {
+            let own = match spent.others {
+                0 => took,
+                others => took.saturating_sub((others as f64 * self.nanos_per_tick) as u64),
+            };
+            seat.stats.exec.add(own);
+            if let Some(used) = spent.thread {
+                seat.stats.check(agrees(own, used));
+            }
+        }
         seat.stats.response.add(nanos(end - job.release));
         if end > job.deadline {
             bump(&seat.stats.missed);
-            if witness.is_some_and(|witness| witness.saw_stall(job.release, end)) {
+            if watch.is_some_and(|watch| watch.witness.saw_stall(job.release, end)) {
                 bump(&seat.stats.stalled);
             }
         }
@@ -617,6 +667,11 @@ impl Core {
                     };
                     seat.timing = *timing;
                     seat.next_release = next;
+                    if seat.put_off < Time::NEVER {
+                        // Whether it still has to wait is seen when it is looked at next.
+                        seat.put_off = Time::NEVER;
+                        self.ready.mark(*slot);
+                    }
                     if next < Time::NEVER {
                         self.push_release(next, *slot);
                     }
@@ -627,9 +682,9 @@ impl Core {
                     seat.fault = *fault;
                 }
             }
-            Change::Send { end, message } => {
+            Change::Send { end, message, envelope } => {
                 context.begin(AgentId::NONE, now, self.number, &*self.ready);
-                end.send_prepared(message.as_ref());
+                end.send_prepared(envelope, message.as_ref());
                 context.end();
             }
             Change::Stop => {

@@ -55,6 +55,7 @@ mod check;
 mod context;
 mod door;
 mod executor;
+mod folder;
 mod log;
 mod memory;
 mod message_type;
@@ -62,6 +63,7 @@ mod names;
 mod os;
 mod plan;
 mod port;
+mod processor;
 mod request;
 mod ring;
 mod router;
@@ -81,12 +83,13 @@ pub use agent::{
 };
 pub use check::{check, executors_of, wires_of};
 pub use executor::{Cause, StepFault};
+pub use folder::{FolderError, RunFolder};
 pub use log::{LogChoice, Recorder, write_note};
 pub use memory::Found;
 pub use message_type::{LARGEST_BY_VALUE, MessageType};
 pub use plan::{
-    AgentPlan, ExecutorPlan, OnDeath, Plan, TimedRequest, USUAL_DEPTH, USUAL_DEPTH_ON, Wirable, WirePlan,
-    owner, value_of,
+    AgentPlan, ExecutorPlan, OnDeath, Plan, TimedRequest, USUAL_DEPTH, USUAL_DEPTH_ON, Wirable, WireFilter,
+    WirePlan, owner, value_of,
 };
 pub use port::{
     Direction, Envelope, Input, Output, OutputFault, Port, PortEnds, PortOptions, PortShape, PortVisit,
@@ -96,7 +99,7 @@ pub use request::{
     AgentState, AgentView, Counts, FaultKind, PortView, Refusal, Request, SystemView, WireView,
 };
 pub use ring::{MOST_MESSAGES, Overload};
-pub use router::{Incident, robot_wires};
+pub use router::{Incident, ServiceShape, robot_wires};
 pub use service::{CALLS_UNDER_WAY, Call, Client, Reply, Service, Ticket};
 pub use simulated::Simulation;
 pub use stats::{AgentStats, Figure, Histogram};

@@ -1,4 +1,4 @@
-//! What the runtime asks of the operating system: futexes, scheduling, memory locking. Linux.
+//! What the runtime asks of the operating system: futexes, scheduling, memory locking, whose process it is. Linux.
 
 #![allow(unsafe_code)]
 
@@ -90,6 +90,31 @@ pub(crate) fn set_affinity(cpus: &[usize]) -> io::Result<()> {
         }
         checked(libc::sched_setaffinity(0, size_of::<libc::cpu_set_t>(), &set))
     }
+}
+
+/// How many processors the machine can have.
+pub(crate) fn processors() -> usize {
+    // SAFETY: the call takes a number.
+    let count = unsafe { libc::sysconf(libc::_SC_NPROCESSORS_CONF) };
+    usize::try_from(count).unwrap_or(1).max(1)
+}
+
+/// The processor on which the calling thread runs. No system call where the kernel tells it in the thread's own memory.
+#[inline]
+pub(crate) fn processor() -> usize {
+    // SAFETY: the call has no arguments. Where it is not known it answers −1, which is no processor either.
+    unsafe { libc::sched_getcpu() as usize }
+}
+
+/// How long the calling thread has had a processor (ns). A system call.
+pub(crate) fn thread_time() -> u64 {
+    clock(libc::CLOCK_THREAD_CPUTIME_ID) as u64
+}
+
+/// The number of the user in whose name the process acts.
+pub(crate) fn user() -> u32 {
+    // SAFETY: the call has no arguments and cannot fail.
+    unsafe { libc::geteuid() }
 }
 
 /// The number by which the kernel knows the calling thread.

@@ -1,8 +1,9 @@
 //! The one value that describes a system.
 
+use types::header::LeastPriority;
 use types::params::Params;
 use types::value::{Mistake, Span, Table, Value};
-use types::{Duration, Filter, Message};
+use types::{AgentId, Category, Duration, Filter, Message};
 
 use crate::agent::{ClientEnd, Declare, InputEnd as To, OutputEnd as From, ServiceEnd};
 use crate::ring::Overload;
@@ -92,9 +93,33 @@ pub struct WirePlan {
     /// What happens when there is no room; the usual policy when nothing is said.
     pub overload: Option<Overload>,
     /// Which messages pass.
-    pub filter: Filter,
+    pub filter: WireFilter,
     /// Where it is written.
     pub at: Span,
+}
+
+/// Which messages pass a wire: a [`Filter`] as a plan says it, where agents have names and no numbers yet. Its default lets all
+/// through.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct WireFilter {
+    /// Only this category.
+    pub category: Option<Category>,
+    /// Only this priority or a higher one.
+    pub least_priority: LeastPriority,
+    /// Only this marker.
+    pub marker: Option<u32>,
+    /// Only messages for the agent of this name, or for everybody.
+    pub recipient: Option<String>,
+    /// Only every n-th message that the rest lets through; 0 and 1 let all through.
+    pub every: u32,
+}
+
+impl WireFilter {
+    /// The filter, when the recipient has the number `recipient`.
+    pub(crate) fn with_recipient(&self, recipient: Option<AgentId>) -> Filter {
+        let WireFilter { category, least_priority, marker, every, .. } = *self;
+        Filter { category, least_priority, marker, recipient, every }
+    }
 }
 
 /// A request and its time.
@@ -117,7 +142,7 @@ impl WirePlan {
     /// A wire with the usual depth and policy.
     pub fn new(from: impl Into<String>, to: impl Into<String>) -> WirePlan {
         let (from, to) = (from.into(), to.into());
-        WirePlan { from, to, depth: None, overload: None, filter: Filter::ALL, at: Span::default() }
+        WirePlan { from, to, depth: None, overload: None, filter: WireFilter::default(), at: Span::default() }
     }
 }
 

@@ -176,6 +176,10 @@ pub(crate) trait InputEnd: Any + Send + Sync {
     /// How many messages were taken since the start.
     fn taken(&self) -> u64;
     fn message_type(&self) -> &'static MessageType;
+    /// An output of the same type that belongs to no agent: for a caller from outside.
+    fn facing(&self) -> Arc<dyn OutputEnd>;
+    /// Takes the next message, as CDR: for an end that belongs to no agent.
+    fn take_cdr(&self) -> Option<Vec<u8>>;
 }
 
 /// What the executor asks of the sending side of a port.
@@ -206,7 +210,9 @@ pub(crate) trait OutputEnd: Any + Send + Sync {
     /// Reads a message from CDR, to be sent with [`send_prepared`](Self::send_prepared).
     fn prepare_message(&self, bytes: &[u8]) -> Result<Box<dyn Any + Send>, types::cdr::Error>;
     /// Sends a message that was prepared by an output of the same type.
-    fn send_prepared(&self, message: &(dyn Any + Send));
+    fn send_prepared(&self, envelope: &Envelope, message: &(dyn Any + Send));
+    /// An input of the same type that belongs to no agent: for a caller from outside.
+    fn facing(&self) -> Arc<dyn InputEnd>;
 }
 
 /// How an output misbehaves on request.

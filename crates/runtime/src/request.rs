@@ -2,10 +2,10 @@
 
 use types::params::Fields;
 use types::value::{Table, Value};
-use types::{AgentId, Duration, Filter, Time};
+use types::{AgentId, Duration, Time};
 
 use crate::executor::StepFault;
-use crate::plan::{AgentPlan, WirePlan};
+use crate::plan::{AgentPlan, WireFilter, WirePlan};
 use crate::port::{Direction, OutputFault};
 use crate::ring::Overload;
 use crate::stats::Figure;
@@ -251,7 +251,7 @@ pub struct AgentView {
     pub ports: Vec<PortView>,
     /// What was counted.
     pub counts: Counts,
-    /// How long steps ran (ns).
+    /// How long steps used their processor (ns): on the wall clock without what higher executors took from them.
     pub exec: Figure,
     /// How late steps began (ns).
     pub jitter: Figure,
@@ -282,6 +282,12 @@ pub struct Counts {
     pub hangs: u64,
     /// Times that it was started again.
     pub restarts: u64,
+    /// Steps that are not among those of the figure of execution times, because the witness saw a stall in them.
+    pub left_out: u64,
+    /// Steps whose execution time was held against the thread's own clock.
+    pub checked: u64,
+    /// Of those, the ones for which it said something else.
+    pub disagreed: u64,
 }
 
 /// What a running system says of a port.
@@ -313,7 +319,7 @@ pub struct WireView {
     /// What happens when there is no room.
     pub overload: Overload,
     /// Which messages pass.
-    pub filter: Filter,
+    pub filter: WireFilter,
     /// Messages put into it.
     pub sent: u64,
     /// Messages that were displaced or dropped.

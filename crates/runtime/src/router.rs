@@ -4,6 +4,7 @@
 //! here once all have answered. The order is fixed: the receiver joins before the sender adds; the sender forgets before the
 //! receiver leaves, and a receiver that is not drained yet is asked again.
 
+mod calls;
 mod deaths;
 mod view;
 mod wires;
@@ -12,18 +13,21 @@ use core::sync::atomic::Ordering::Relaxed;
 use std::sync::Arc;
 
 use types::value::Table;
-use types::{AgentId, Duration, Filter, Name, Time};
+use types::{AgentId, Duration, Name, Priority, Time};
 
 use crate::agent::{AgentType, Body, Registry};
 use crate::executor::{Answer, Change, Link, Seat, Timing, heaps_for};
 use crate::log::{LogChoice, LogShared};
 use crate::names::Directory;
-use crate::plan::{AgentPlan, ExecutorPlan, WirePlan};
-use crate::port::{Direction, OutputEnd, PortEnds, WireCounts, WireId};
+use crate::plan::{AgentPlan, ExecutorPlan, WireFilter, WirePlan};
+use crate::port::{Direction, Envelope, OutputEnd, PortEnds, WireCounts, WireId};
 use crate::request::{AgentState, FaultKind, Refusal, Request};
 use crate::ring::Overload;
 use crate::stats::AgentStats;
 use crate::tap::Tap;
+
+pub(crate) use calls::OutsideCall;
+pub use calls::ServiceShape;
 
 /// Readers for which an output's memory has room besides those in the plan.
 const SPARE_SEATS: usize = 8;
@@ -57,6 +61,18 @@ struct Known {
     spare: Option<Box<dyn Body>>,
 }
 
+impl Known {
+    /// The priorities that a port of it uses, the most urgent first.
+    fn priorities(&self, port: usize) -> Vec<Priority> {
+        let mut priorities: Vec<Priority> = self.kind.ports[port].options.priorities().collect();
+        priorities.sort_unstable_by(|a, b| b.cmp(a));
+        if priorities.is_empty() {
+            priorities.push(Priority::Normal);
+        }
+        priorities
+    }
+}
+
 struct Wire {
     id: WireId,
     from: (AgentId, usize),
@@ -67,7 +83,7 @@ struct Wire {
     is_answer: bool,
     depth: usize,
     overload: Overload,
-    filter: Filter,
+    filter: WireFilter,
     counts: Arc<WireCounts>,
 }
 
@@ -100,6 +116,10 @@ pub(crate) struct Router {
     pub executors: Vec<ExecutorKnown>,
     next_agent: u32,
     next_wire: u32,
+    /// The number of the last caller from outside.
+    next_caller: u32,
+    /// Calls from outside that wait for their answers.
+    calls: Vec<calls::UnderWay>,
     pub incidents: Vec<Incident>,
     /// At least as many as wait to be started again: who is dead is looked for only when somebody is.
     restarting: usize,
@@ -129,6 +149,8 @@ impl Router {
             executors,
             next_agent: 0,
             next_wire: 0,
+            next_caller: AgentId::NONE.0,
+            calls: Vec::new(),
             incidents: Vec::new(),
             restarting: 0,
             died: Vec::new(),
@@ -370,6 +392,7 @@ impl Router {
             stats: stats.clone(),
             next_release: Time::NEVER,
             alarm: Time::NEVER,
+            put_off: Time::NEVER,
             last_step: Time(i64::MIN / 2),
             started: false,
             fault: Default::default(),
@@ -436,12 +459,22 @@ impl Router {
             )));
         }
         let (id, executor, slot) = (self.agents[at].id, self.agents[at].executor, self.agents[at].slot);
+        let is_for_it = |wire: &&Wire| wire.filter.recipient.as_deref() == Some(name);
+        if let Some(wire) =
+            self.wires.iter().filter(is_for_it).find(|wire| wire.from.0 != id && wire.to.0 != id)
+        {
+            // Whoever gets the name later has another number, and the filter would let nothing for it through.
+            let WirePlan { from, to, .. } = self.plan_of(wire);
+            return Err(Refusal::new(format!("the wire from {from} to {to} takes what is for {name}"))
+                .help("cut that wire first"));
+        }
         let wires: Vec<WireId> = self
             .wires
             .iter()
             .filter(|wire| wire.from.0 == id || wire.to.0 == id)
             .map(|wire| wire.id)
             .collect();
+        self.end_calls_of(id);
         // First nobody sends to it any more, then it stops, then it is gone from the wires to others.
         for wire in &wires {
             self.cut(*wire, true, fabric)?;
@@ -615,7 +648,7 @@ impl Router {
         };
         let executor = self.agents[agent].executor;
         let message = end.prepare_message(bytes).map_err(|error| Refusal::new(error.to_string()))?;
-        self.commit(executor, Change::Send { end, message }, fabric)
+        self.commit(executor, Change::Send { end, message, envelope: Envelope::default() }, fabric)
     }
 
     /// Computes the data-flow order of an executor and gives it to it.

@@ -17,7 +17,7 @@ use crate::log::LogThread;
 use crate::os;
 use crate::plan::Plan;
 use crate::request::{Refusal, Request};
-use crate::router::{Incident, Router};
+use crate::router::{Incident, OutsideCall, Router};
 use crate::system::{Ask, Built, CannotRun, Control, Options, Report, Still, Verdict, asks, build};
 use crate::trace;
 
@@ -160,6 +160,7 @@ fn play(simulation: Simulation) -> Result<Report, CannotRun> {
         let next_supervision = player.supervise();
         // Who was started again may have messages to take at this very instant.
         player.instant()?;
+        let next_call = player.answer_calls();
         if player.now >= next_look {
             next_look = player.now + observer.every().max(Duration::millis(1));
             if let Verdict::End(reason) = observer.observe(player.now, &player.router.incidents) {
@@ -167,17 +168,20 @@ fn play(simulation: Simulation) -> Result<Report, CannotRun> {
             }
         }
         let next_timed = timed.peek().map_or(Time::NEVER, |(at, _, _)| *at);
-        let next = player.next_event().min(next_timed).min(next_look).min(next_supervision).min(end);
+        let next =
+            player.next_event().min(next_timed).min(next_look).min(next_supervision).min(next_call).min(end);
         if player.now >= end {
             break "the time is over".into();
         }
         if next == Time::NEVER {
             break "nothing is left to do".into();
         }
-        if let Some(reason) = player.pace(next, speed, begun, &asks) {
-            break reason;
+        match player.pace(next, speed, begun, &asks) {
+            Paced::Due => player.now = next.max(player.now),
+            // What was asked may have made agents ready at this very instant.
+            Paced::Asked => {}
+            Paced::Ended(reason) => break reason,
         }
-        player.now = next.max(player.now);
     };
     player.stop();
     drop(entered);
@@ -194,6 +198,16 @@ fn play(simulation: Simulation) -> Result<Report, CannotRun> {
         stalls: 0,
         log_dropped,
     })
+}
+
+/// How waiting for the next instant ended.
+enum Paced {
+    /// It is time.
+    Due,
+    /// Something was asked, and answered.
+    Asked,
+    /// The run ends, for this reason.
+    Ended(String),
 }
 
 impl Player {
@@ -310,10 +324,25 @@ impl Player {
             }
             Ask::View(answer) => drop(answer.send(self.router.view(self.now))),
             Ask::Plan(answer) => drop(answer.send(self.router.to_plan())),
+            Ask::Service(port, answer) => drop(answer.send(self.router.service(&port))),
+            Ask::Call(call) => self.call(call),
             Ask::Tap(port, answer) => drop(answer.send(self.router.tap(&port))),
             Ask::Untap(tap) => self.router.untap(&tap),
         }
         None
+    }
+
+    fn call(&mut self, call: OutsideCall) {
+        let said = call.said();
+        let mut fabric = Still { cores: &mut self.cores, context: &self.context, now: self.now };
+        let refused = self.router.call(call, self.now, &mut fabric).err();
+        let outcome = refused.map_or(String::new(), |refusal| format!("; refused: {refusal}"));
+        self.context.log(|log| log.line(self.now, "control", &format!("asked: {said}{outcome}")));
+    }
+
+    fn answer_calls(&mut self) -> Time {
+        let mut fabric = Still { cores: &mut self.cores, context: &self.context, now: self.now };
+        self.router.answer_calls(self.now, &mut fabric)
     }
 
     fn next_event(&self) -> Time {
@@ -323,22 +352,18 @@ impl Player {
         releases.min().unwrap_or(Time::NEVER).min(hung)
     }
 
-    /// Where the run shall not be faster than a clock, waits for it, and answers what is asked meanwhile.
-    fn pace(&mut self, next: Time, speed: Option<f64>, begun: i64, asks: &Receiver<Ask>) -> Option<String> {
-        let speed = speed.filter(|speed| *speed > 0.0)?;
+    /// Where the run shall not be faster than a clock, waits for it, or until something is asked.
+    fn pace(&mut self, next: Time, speed: Option<f64>, begun: i64, asks: &Receiver<Ask>) -> Paced {
+        let Some(speed) = speed.filter(|speed| *speed > 0.0) else { return Paced::Due };
         let due = begun + (next.seconds() / speed * 1e9) as i64;
         loop {
             let left = due - os::monotonic();
             if left <= 0 {
-                return None;
+                return Paced::Due;
             }
             match asks.recv_timeout(HostDuration::from_nanos(left as u64)) {
-                Ok(ask) => {
-                    if let Some(reason) = self.answer(ask) {
-                        return Some(reason);
-                    }
-                }
-                Err(std::sync::mpsc::RecvTimeoutError::Timeout) => return None,
+                Ok(ask) => return self.answer(ask).map_or(Paced::Asked, Paced::Ended),
+                Err(std::sync::mpsc::RecvTimeoutError::Timeout) => return Paced::Due,
                 Err(std::sync::mpsc::RecvTimeoutError::Disconnected) => {
                     std::thread::park_timeout(HostDuration::from_nanos(left as u64));
                 }

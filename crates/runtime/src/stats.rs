@@ -146,12 +146,29 @@ pub struct AgentStats {
     pub hangs: AtomicU64,
     /// Times that the agent was started again.
     pub restarts: AtomicU64,
-    /// How long steps ran (ns).
+    /// Steps that are not among those of `exec`, because the witness saw a stall in them.
+    pub left_out: AtomicU64,
+    /// Steps that were held against the thread's clock.
+    pub checked: AtomicU64,
+    /// Of those, the ones for which it said something else.
+    pub disagreed: AtomicU64,
+    /// How long steps used their processor (ns): on the wall clock without what higher executors took from them.
     pub exec: Histogram,
     /// How late steps began (ns).
     pub jitter: Histogram,
     /// From the release to the end of the step (ns).
     pub response: Histogram,
+}
+
+impl AgentStats {
+    /// A step was held against the thread's clock.
+    #[cold]
+    pub(crate) fn check(&self, agrees: bool) {
+        bump(&self.checked);
+        if !agrees {
+            bump(&self.disagreed);
+        }
+    }
 }
 
 /// Adds one to a counter that one thread writes.

@@ -12,7 +12,7 @@ use crate::log::{LogChoice, Recorder};
 use crate::names::Directory;
 use crate::plan::{AgentPlan, Plan, WirePlan};
 use crate::request::{Refusal, Request, SystemView};
-use crate::router::{ExecutorKnown, Fabric, Incident, Router};
+use crate::router::{ExecutorKnown, Fabric, Incident, OutsideCall, Router, ServiceShape};
 use crate::tap::Tap;
 
 /// What somebody wants of a running system, on the way to it.
@@ -20,6 +20,8 @@ pub(crate) enum Ask {
     Request(Box<Request>, SyncSender<Result<(), Refusal>>),
     View(SyncSender<SystemView>),
     Plan(SyncSender<(Vec<AgentPlan>, Vec<WirePlan>)>),
+    Service(String, SyncSender<Result<ServiceShape, Refusal>>),
+    Call(OutsideCall),
     Tap(String, SyncSender<Result<Tap, Refusal>>),
     Untap(Tap),
 }
@@ -54,6 +56,18 @@ impl Control {
     /// The agents and wires that run, as a plan would give them.
     pub fn plan(&self) -> Result<(Vec<AgentPlan>, Vec<WirePlan>), Refusal> {
         self.ask(Ask::Plan)
+    }
+
+    /// What a service takes and gives.
+    pub fn service(&self, port: &str) -> Result<ServiceShape, Refusal> {
+        self.ask(|answer| Ask::Service(port.to_owned(), answer))?
+    }
+
+    /// Calls a service with a question in CDR and waits for the answer, in CDR too, for as long as `within` on the clock of the
+    /// system. Nobody has to be wired to the service, and no wire is touched.
+    pub fn call(&self, service: &str, cdr: Vec<u8>, within: Duration) -> Result<Vec<u8>, Refusal> {
+        let service = service.to_owned();
+        self.ask(|asker| Ask::Call(OutsideCall { service, cdr, within, asker }))?
     }
 
     /// Listens to an output. What is not read in time is lost to the reader alone, and counted.

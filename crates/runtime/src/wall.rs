@@ -22,8 +22,9 @@ use crate::log::LogThread;
 use crate::names::Directory;
 use crate::os;
 use crate::plan::{ExecutorPlan, Plan};
+use crate::processor::{Processors, Stopwatch};
 use crate::request::{Refusal, Request};
-use crate::router::{Fabric, Incident, Router};
+use crate::router::{Fabric, Incident, OutsideCall, Router};
 use crate::system::{Ask, Built, CannotRun, Control, Options, Report, Verdict, asks, build};
 use crate::trace;
 use crate::witness::Witness;
@@ -35,6 +36,8 @@ const WATCHDOG_PRIORITY: u8 = 94;
 const WATCHDOG_PERIOD: Duration = Duration::millis(5);
 /// How often the control side looks without being asked.
 const CONTROL_PERIOD: HostDuration = HostDuration::from_millis(10);
+/// The same while somebody outside waits for the answer to a call.
+const CALL_PERIOD: HostDuration = HostDuration::from_millis(1);
 /// More steps than this that never returned, and the system stops.
 const MOST_HUNG: usize = 4;
 /// How long the control side waits for an executor to answer.
@@ -151,6 +154,7 @@ struct Runner {
     directory: Arc<Directory>,
     next_thread: u32,
     witness: Arc<Witness>,
+    processors: Arc<Processors>,
 }
 
 /// Ends of log rings that were made ahead for spare threads.
@@ -199,6 +203,7 @@ impl Runner {
             next_thread: NOBODY,
             router,
             witness,
+            processors: Arc::new(Processors::new()),
         };
         for core in cores {
             runner.start_executor(core)?;
@@ -243,11 +248,12 @@ impl Runner {
     fn spawn(&mut self, at: usize, number: u32) -> Result<(), CannotRun> {
         let cell = self.cells[at].clone();
         let plan = self.router.executors[at].plan.clone();
-        let (clock, directory, witness) = (self.clock, self.directory.clone(), self.witness.clone());
+        let (clock, directory) = (self.clock, self.directory.clone());
+        let (witness, processors) = (self.witness.clone(), self.processors.clone());
         let log = self.spare_logs.pop();
         let thread = std::thread::Builder::new()
             .name(format!("sinew-{}", plan.name))
-            .spawn(move || thread_main(&cell, number, &plan, clock, log, directory, &witness))
+            .spawn(move || thread_main(&cell, number, &plan, clock, log, directory, (&witness, &processors)))
             .map_err(|error| CannotRun::NoThread(error.to_string()))?;
         self.threads.push(thread);
         Ok(())
@@ -284,7 +290,8 @@ impl Runner {
             if let Some(reason) = self.look(&mut next_look)? {
                 break reason;
             }
-            match self.asks.recv_timeout(CONTROL_PERIOD) {
+            let pause = if self.router.has_calls() { CALL_PERIOD } else { CONTROL_PERIOD };
+            match self.asks.recv_timeout(pause) {
                 Ok(ask) => {
                     if let Some(reason) = self.answer(ask) {
                         break reason;
@@ -327,6 +334,7 @@ impl Runner {
         self.make_spares()?;
         let mut fabric = Threads { cells: &self.cells, waited: None };
         self.router.supervise(now, &mut fabric);
+        self.router.answer_calls(now, &mut fabric);
         for incident in &self.router.incidents[self.incidents_seen..] {
             self.router.log_shared.note(incident.time, &incident.agent, &incident.what);
         }
@@ -366,6 +374,14 @@ impl Runner {
         self.router.apply(request, self.clock.now(), &mut fabric)
     }
 
+    fn call(&mut self, call: OutsideCall, now: Time) {
+        let said = call.said();
+        let mut fabric = Threads { cells: &self.cells, waited: None };
+        let refused = self.router.call(call, now, &mut fabric).err();
+        let outcome = refused.map_or(String::new(), |refusal| format!("; refused: {refusal}"));
+        self.router.log_shared.note(now, "control", &format!("asked: {said}{outcome}"));
+    }
+
     fn answer(&mut self, ask: Ask) -> Option<String> {
         let now = self.clock.now();
         match ask {
@@ -382,6 +398,8 @@ impl Runner {
             }
             Ask::View(answer) => drop(answer.send(self.router.view(now))),
             Ask::Plan(answer) => drop(answer.send(self.router.to_plan())),
+            Ask::Service(port, answer) => drop(answer.send(self.router.service(&port))),
+            Ask::Call(call) => self.call(call, now),
             Ask::Tap(port, answer) => drop(answer.send(self.router.tap(&port))),
             Ask::Untap(tap) => self.router.untap(&tap),
         }
@@ -451,7 +469,7 @@ fn thread_main(
     clock: WallClock,
     log: Option<trace::Writer>,
     directory: Arc<Directory>,
-    witness: &Witness,
+    (witness, processors): (&Witness, &Processors),
 ) {
     os::touch_stack();
     os::exact_timers();
@@ -479,7 +497,10 @@ fn thread_main(
     }
     cell.thread.store(os::thread_id(), Ordering::Release);
     *cell.granted.lock().unwrap_or_else(PoisonError::into_inner) = Some(granted);
-    run_core(cell, number, plan, clock, &context, witness);
+    let (policy, priority) = os::granted();
+    let level = if policy == libc::SCHED_FIFO { u64::try_from(priority).unwrap_or(0) } else { 0 };
+    let watch = Stopwatch::new(witness, processors, level, &plan.cpus);
+    run_core(cell, number, plan, clock, &context, &watch);
 }
 
 /// Asks for what the plan says, and tells what was granted.
@@ -510,9 +531,15 @@ fn run_core(
     plan: &ExecutorPlan,
     clock: WallClock,
     context: &Context,
-    witness: &Witness,
+    watch: &Stopwatch<'_>,
 ) {
     let core = cell.core.get();
+    let mut woken = watch.wake();
+    let mut sleep = |until| {
+        watch.rest(&woken);
+        cell.door.sleep(until);
+        woken = watch.wake();
+    };
     loop {
         let now = clock.now();
         let job = {
@@ -524,7 +551,7 @@ fn run_core(
         if let Some(job) = job {
             let mine = || is_mine(cell, number);
             // SAFETY: the core is this thread's own; `mine` says whether it still is after the step.
-            let ended = unsafe { Core::run(core, context, job, now, Some(witness), mine) };
+            let ended = unsafe { Core::run(core, context, job, now, Some(watch), mine) };
             match ended {
                 None => return,
                 Some(Ended::AskedToHang(slot)) => {
@@ -545,12 +572,12 @@ fn run_core(
         match until {
             Some(until) if plan.spin > Duration::ZERO => {
                 if until - os::monotonic() > plan.spin.0 {
-                    cell.door.sleep(Some(until - plan.spin.0));
+                    sleep(Some(until - plan.spin.0));
                 } else {
                     core::hint::spin_loop();
                 }
             }
-            _ => cell.door.sleep(until),
+            _ => sleep(until),
         }
     }
 }

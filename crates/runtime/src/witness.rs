@@ -48,7 +48,8 @@ impl Witness {
                 seen.end.store(i64::MIN, Ordering::Release);
                 seen.begin.store(due + offset, Ordering::Release);
                 seen.end.store(now + offset, Ordering::Release);
-                self.stalls.fetch_add(1, Ordering::Relaxed);
+                // Release: partner of the acquire in `stalls`.
+                self.stalls.fetch_add(1, Ordering::Release);
             }
             due = if now > due + PERIOD { now + PERIOD } else { due + PERIOD };
         }
@@ -64,7 +65,9 @@ impl Witness {
     }
 
     /// How many stalls there were.
+    #[inline]
     pub(crate) fn stalls(&self) -> u64 {
-        self.stalls.load(Ordering::Relaxed)
+        // Acquire: who sees the number sees when the last of them was.
+        self.stalls.load(Ordering::Acquire)
     }
 }

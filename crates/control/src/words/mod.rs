@@ -3,7 +3,7 @@
 //! ```text
 //! add NAME is KIND [robot=…] [period=…] [on=a,b] [deadline=…] … [KEY=VALUE…]
 //! remove NAME            restart NAME           replace NAME is KIND [KEY=VALUE…]
-//! wire FROM TO [depth=N] [overload=POLICY] [every=N] [priority=LEAST] [marker=N] [category=…] [recipient=N]
+//! wire FROM TO [depth=N] [overload=POLICY] [every=N] [priority=LEAST] [marker=N] [category=…] [recipient=AGENT]
 //! unwire FROM TO         set NAME KEY=VALUE…    fault TARGET KIND
 //! send PORT cdr=HEX      quit
 //! ```

@@ -5,7 +5,7 @@ use std::str::FromStr;
 use runtime::{AgentPlan, FaultKind, OnDeath, Overload, Refusal, Request, WirePlan};
 use types::header::LeastPriority;
 use types::value::Table;
-use types::{AgentId, Category, Duration, Priority};
+use types::{Category, Duration, Priority};
 
 use super::{AND, CHANGES, WIRE_KEYS, read_value};
 
@@ -146,7 +146,7 @@ fn read_wire(words: &[String]) -> Read<WirePlan> {
     plan.depth = pairs.number("depth")?;
     plan.filter.every = pairs.number("every")?.unwrap_or_default();
     plan.filter.marker = pairs.number("marker")?;
-    plan.filter.recipient = pairs.number("recipient")?.map(AgentId);
+    plan.filter.recipient = pairs.take("recipient").map(str::to_owned);
     let policies = [Overload::NewestWins, Overload::OldestWins, Overload::Refuse].map(Overload::name);
     plan.overload = pairs.named("overload", Overload::named, &policies)?;
     plan.filter.category = pairs.named("category", Category::named, &Category::ALL.map(Category::name))?;

@@ -3,10 +3,10 @@
 use proptest::collection::vec;
 use proptest::option;
 use proptest::prelude::*;
-use runtime::{AgentPlan, FaultKind, OnDeath, Overload, Request, WirePlan};
+use runtime::{AgentPlan, FaultKind, OnDeath, Overload, Request, WireFilter, WirePlan};
 use types::header::LeastPriority;
 use types::value::{Table, Value};
-use types::{AgentId, Category, Duration, Filter, Priority};
+use types::{Category, Duration, Priority};
 
 use super::*;
 
@@ -39,17 +39,17 @@ fn every_request_can_be_said() {
     assert_eq!(plan.params.get("near").unwrap().value, Value::Float(0.25));
     assert_eq!(plan.params.len(), 2);
 
-    let Ok(Request::Wire(wire)) =
-        read("wire a.out b.in depth=8 overload=refuse every=2 priority=high marker=7 category=event")
-    else {
+    let Ok(Request::Wire(wire)) = read(
+        "wire a.out b.in depth=8 overload=refuse every=2 priority=high marker=7 category=event recipient=b",
+    ) else {
         panic!("no wire")
     };
     assert_eq!((wire.depth, wire.overload), (Some(8), Some(Overload::Refuse)));
-    let filter = Filter {
+    let filter = WireFilter {
         category: Some(Category::Event),
         least_priority: LeastPriority(Priority::High),
         marker: Some(7),
-        recipient: None,
+        recipient: Some("b".to_owned()),
         every: 2,
     };
     assert_eq!(wire.filter, filter);
@@ -153,9 +153,9 @@ prop_compose! {
         (from, to, depth) in (port(), port(), option::of(any::<usize>())),
         overload in option::of(prop::sample::select(vec![Overload::NewestWins, Overload::OldestWins, Overload::Refuse])),
         (category, priority) in (option::of(prop::sample::select(&Category::ALL[..])), prop::sample::select(&Priority::ALL[..])),
-        (marker, recipient, every) in (option::of(any::<u32>()), option::of(any::<u32>()), prop_oneof![0..3u32, any::<u32>()]),
+        (marker, recipient, every) in (option::of(any::<u32>()), option::of(name()), prop_oneof![0..3u32, any::<u32>()]),
     ) -> WirePlan {
-        let filter = Filter { category, least_priority: LeastPriority(priority), marker, recipient: recipient.map(AgentId), every };
+        let filter = WireFilter { category, least_priority: LeastPriority(priority), marker, recipient, every };
         WirePlan { depth, overload, filter, ..WirePlan::new(from, to) }
     }
 }

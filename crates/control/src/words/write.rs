@@ -75,6 +75,6 @@ fn wire(plan: &WirePlan) -> Vec<String> {
     push(&mut out, "priority", (least != Priority::Low).then(|| least.name()));
     push(&mut out, "marker", filter.marker);
     push(&mut out, "category", filter.category.map(|category| category.name()));
-    push(&mut out, "recipient", filter.recipient.map(|agent| agent.0));
+    push(&mut out, "recipient", filter.recipient.as_ref());
     out
 }

@@ -9,10 +9,10 @@ use std::sync::{Arc, Mutex};
 use std::thread::JoinHandle;
 
 use control::words::{self, Usage};
-use control::{Client, Hooks, Limits, RunFolder, Server};
+use control::{Client, Hooks, Limits, Server};
 use runtime::{
-    Agent, Control, Fault, Input, Options, Output, Params, Plan, Refusal, Registry, Report, Request, Service,
-    Simulation, Step, registry,
+    Agent, Control, Fault, Input, Options, Output, Params, Plan, Refusal, Registry, Report, Request,
+    RunFolder, Service, Simulation, Step, registry,
 };
 use serde_json::{Value as Json, json};
 use types::Duration;
@@ -192,7 +192,7 @@ impl Scratch {
     }
 
     pub(crate) fn folder(&self) -> RunFolder {
-        RunFolder::open_for(Some(self.0.clone().into())).unwrap()
+        RunFolder::at(&self.0.join("sinew")).unwrap()
     }
 }
 

@@ -10,7 +10,6 @@
 //! On hardware it is a word in a mapped file of the run folder, so any process of the user can set it and it outlives them all.
 //! A simulated run has one of its own in private memory.
 
-mod folder;
 mod page;
 
 use std::fs::{File, OpenOptions};
@@ -20,9 +19,9 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::atomic::Ordering;
 
+use runtime::{FolderError, RunFolder};
 use types::Time;
 
-pub use folder::{FolderError, RunFolder};
 use page::{PAGE, Page};
 
 /// What the first word of a page says: whose it is, and the form of what follows.
@@ -161,8 +160,7 @@ impl Latch {
     /// # Errors
     /// As [`open`](Self::open).
     pub fn open_in(folder: &RunFolder, system: &str, robot: &str) -> Result<Latch, LatchError> {
-        let name = format!("{}.{}.latch", folder::file_word(system), folder::file_word(robot));
-        let path = folder.path().join(name);
+        let path = folder.file(&[system, robot], "latch");
         let page = map(&path).map_err(|cause| LatchError::Io { path: path.clone(), cause })?;
         let head = &page.words()[HEAD];
         // Whoever comes first marks the page. The rest of a new page is zero, and that is a clear latch.

@@ -183,6 +183,13 @@ impl Truth {
         Some(goal.why(&progress))
     }
 
+    /// When a robot met the stages that are behind it, the first twelve of them.
+    pub fn passed(&self, robot: &str) -> Vec<Time> {
+        let Some(index) = self.index(robot) else { return Vec::new() };
+        let progress = self.newest.read(|moment| moment.robots.get(index)?.progress.clone());
+        progress.map_or_else(Vec::new, |progress| progress.passed().to_vec())
+    }
+
     /// What stands still, to draw.
     pub fn scenery(&self) -> &Scenery {
         &self.fixed.scenery

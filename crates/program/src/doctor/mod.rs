@@ -66,7 +66,7 @@ pub fn examine() -> Examination {
 
 /// Where running systems leave what others may find.
 fn run_folder() -> PathBuf {
-    match hardware::latch::RunFolder::open() {
+    match runtime::RunFolder::open() {
         Ok(folder) => folder.path().to_owned(),
         Err(_) => PathBuf::new(),
     }

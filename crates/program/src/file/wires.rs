@@ -1,8 +1,8 @@
 //! `[wires]`: from each output to its inputs.
 
-use runtime::{Overload, WirePlan};
+use runtime::{Overload, WireFilter, WirePlan};
 use types::value::{Entry, Mistake, Span, Table, TableReader, Value, nearest};
-use types::{Category, Filter, Priority};
+use types::{Category, Priority};
 
 use super::read::{Reader, unknown};
 
@@ -48,7 +48,7 @@ impl Reader<'_> {
         let mut wire = WirePlan { at: target.at, ..WirePlan::new(from.unwrap_or_default(), "") };
         let to = match &target.value {
             Value::Text(to) => Some((to.as_str(), target.at)),
-            Value::Table(table) => self.details(table, target.at, &mut wire),
+            Value::Table(table) => self.details(prefix, table, target.at, &mut wire),
             other => {
                 let what = format!("a wire leads to an input, not to {} ({other})", other.kind());
                 self.mistakes.push(Mistake::new(target.at, what).help("write it as in \"safety.ranges\""));
@@ -65,14 +65,20 @@ impl Reader<'_> {
     }
 
     /// Reads `{ to = "e.f", depth = 8, … }` into the wire; gives the input's name.
-    fn details<'t>(&mut self, table: &'t Table, at: Span, wire: &mut WirePlan) -> Option<(&'t str, Span)> {
+    fn details<'t>(
+        &mut self,
+        prefix: &str,
+        table: &'t Table,
+        at: Span,
+        wire: &mut WirePlan,
+    ) -> Option<(&'t str, Span)> {
         let mut r = TableReader::new(table, at, "the wire");
         let to = r.required_text("to", "the input it leads to");
         let place = r.place("to");
         wire.depth = whole(&mut r, "depth", 1, runtime::MOST_MESSAGES as i64).map(|n| n as usize);
         let policies = [Overload::NewestWins, Overload::OldestWins, Overload::Refuse].map(Overload::name);
         wire.overload = word(&mut r, "overload", "overload policy", &policies, Overload::named);
-        wire.filter = Filter {
+        wire.filter = WireFilter {
             every: whole(&mut r, "every", 0, u32::MAX.into()).unwrap_or(0) as u32,
             marker: whole(&mut r, "marker", 0, u32::MAX.into()).map(|n| n as u32),
             category: word(
@@ -82,15 +88,32 @@ impl Reader<'_> {
                 &Category::ALL.map(Category::name),
                 Category::named,
             ),
-            ..Filter::ALL
+            ..WireFilter::default()
         };
         if let Some(least) =
             word(&mut r, "priority", "priority", &Priority::ALL.map(Priority::name), Priority::named)
         {
             wire.filter.least_priority.0 = least;
         }
+        let recipient = r.text("recipient").map(|name| (format!("{prefix}{name}"), r.place("recipient")));
         r.finish(&mut self.mistakes);
+        wire.filter.recipient = recipient.and_then(|(name, at)| self.recipient(name, at));
         to.map(|to| (to, place))
+    }
+
+    /// The agent of this full name; none, and said why, when there is none.
+    fn recipient(&mut self, name: String, at: Span) -> Option<String> {
+        if self.plan.agent(&name).is_some() {
+            return Some(name);
+        }
+        let mistake = if self.names.is_group(&name) {
+            Mistake::new(at, format!("\"{name}\" is a group, and messages are for one agent"))
+                .help(format!("name the agent in it, as in \"{name}.AGENT\""))
+        } else {
+            self.no_agent(&name, at)
+        };
+        self.mistakes.push(mistake);
+        None
     }
 
     /// The full name of the port that `name` means; none, and said why, when there is none.

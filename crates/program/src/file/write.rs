@@ -2,9 +2,9 @@
 
 use std::fmt::{self, Write as _};
 
-use runtime::{AgentPlan, ExecutorPlan, OnDeath, Plan, TimedRequest, WirePlan};
+use runtime::{AgentPlan, ExecutorPlan, OnDeath, Plan, TimedRequest, WireFilter, WirePlan};
+use types::Duration;
 use types::value::{Entry, Key, Table, Value};
-use types::{Duration, Filter};
 
 use super::decide;
 use super::read::ROBOT;
@@ -177,7 +177,7 @@ fn target(wire: &WirePlan) -> Value {
     if filter.every != 0 {
         table.set("every", Value::from(filter.every));
     }
-    if filter.least_priority != Filter::ALL.least_priority {
+    if filter.least_priority != WireFilter::default().least_priority {
         table.set("priority", Value::from(filter.least_priority.0.name()));
     }
     if let Some(marker) = filter.marker {
@@ -185,6 +185,9 @@ fn target(wire: &WirePlan) -> Value {
     }
     if let Some(category) = filter.category {
         table.set("category", Value::from(category.name()));
+    }
+    if let Some(recipient) = &filter.recipient {
+        table.set("recipient", Value::from(recipient.as_str()));
     }
     if table.len() == 1 { Value::from(wire.to.as_str()) } else { Value::Table(table) }
 }

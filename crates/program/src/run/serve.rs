@@ -7,11 +7,11 @@ use std::thread::JoinHandle;
 use std::time::Duration as HostDuration;
 
 use control::words::Usage;
-use control::{Hooks, RunFolder, Server};
+use control::{Hooks, Server};
 use hardware::Latch;
 use hardware::latch::Cause;
 use record::{dynamic, schema::Schema};
-use runtime::{AgentPlan, Control, Overload, Plan, Refusal, Registry, WirePlan};
+use runtime::{AgentPlan, Control, Overload, Plan, Refusal, Registry, RunFolder, WirePlan};
 use serde_json::{Value as Json, json};
 use types::definition::Definition;
 use types::message::Message as _;

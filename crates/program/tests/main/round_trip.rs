@@ -2,9 +2,9 @@
 
 use program::file::{self, Shelf, read_plan, write_plan};
 use proptest::prelude::*;
-use runtime::{AgentPlan, ExecutorPlan, OnDeath, Overload, Plan, TimedRequest, WirePlan};
+use runtime::{AgentPlan, ExecutorPlan, OnDeath, Overload, Plan, TimedRequest, WireFilter, WirePlan};
 use types::value::{Span, Table, Value};
-use types::{Category, Duration, Filter, Priority};
+use types::{Category, Duration, Priority};
 
 use crate::registry;
 
@@ -44,7 +44,7 @@ fn what_the_file_says_is_in_the_plan() {
         agent.safety = { is = "safety-monitor", on = "ranges", deadline = "5ms", executor = "reflex", stop_distance = 0.3 }
         agent.decision = { is = "decision-maker", period = "100ms", on = ["safety"], on_death = "leave" }
         executor.reflex = { priority = 75, cpus = [1], spin = "20us" }
-        wires."safety.safety" = [{ to = "decision.safety", depth = 2, overload = "refuse", every = 3, priority = "high" }]
+        wires."safety.safety" = [{ to = "decision.safety", depth = 2, overload = "refuse", every = 3, priority = "high", recipient = "decision" }]
         decide.danger.near = { safety = 1.0 }
         at = [{ time = "40s", do = ["fault", "h1.sonar", "off"] }]
     "#;
@@ -72,6 +72,7 @@ fn what_the_file_says_is_in_the_plan() {
     assert_eq!((wire.from.as_str(), wire.to.as_str()), ("safety.safety", "decision.safety"));
     assert_eq!((wire.depth, wire.overload, wire.filter.every), (Some(2), Some(Overload::Refuse), 3));
     assert_eq!(wire.filter.least_priority.0, Priority::High);
+    assert_eq!(wire.filter.recipient.as_deref(), Some("decision"));
     let request = &plan.requests[0];
     assert_eq!((request.at, request.words.join(" ").as_str()), (Duration::secs(40), "fault h1.sonar off"));
     assert_eq!(plan.sections.get("world").unwrap().value, Value::from("laboratory"));
@@ -100,6 +101,7 @@ fn a_group_brings_its_agents_under_its_name() {
         wires,
         ["body.eyes.sonar.filtered > body.safety.ranges", "body.eyes.sonar.filtered > wall.ranges"]
     );
+    assert_eq!(loaded.plan.wires[0].filter.recipient.as_deref(), Some("body.safety"));
     let plan = bare(loaded.plan);
     assert_eq!(again(&plan), plan);
 }
@@ -160,16 +162,17 @@ fn wire(to: String) -> impl Strategy<Value = WirePlan> {
     let category = proptest::option::of(proptest::sample::select(Category::ALL.to_vec()));
     let priority = proptest::sample::select(Priority::ALL.to_vec());
     let marker = proptest::option::of(any::<u32>());
-    (proptest::option::of(1usize..1000), policy, category, priority, marker, 0u32..9).prop_map(
-        move |(depth, overload, category, priority, marker, every)| WirePlan {
+    let recipient = proptest::sample::select(vec![None, Some("eyes"), Some("wall")]);
+    (proptest::option::of(1usize..1000), policy, category, priority, marker, recipient, 0u32..9).prop_map(
+        move |(depth, overload, category, priority, marker, recipient, every)| WirePlan {
             depth,
             overload,
-            filter: Filter {
+            filter: WireFilter {
                 category,
                 least_priority: types::header::LeastPriority(priority),
                 marker,
+                recipient: recipient.map(str::to_owned),
                 every,
-                ..Filter::ALL
             },
             ..WirePlan::new("eyes.filtered", to.clone())
         },

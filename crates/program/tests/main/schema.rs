@@ -27,6 +27,9 @@ fn it_agrees_with_every_scenario() {
     }
     let groups = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/groups/robot.toml");
     assert_eq!(said(&fs::read_to_string(groups).unwrap()), None);
+    let wire = |recipient| format!("wires.\"a.b\" = {{ to = \"c.d\", every = 2, recipient = {recipient} }}");
+    assert_eq!(said(&wire("\"c\"")), None);
+    assert!(said(&wire("3")).is_some_and(|error| error.contains("recipient")));
 }
 
 #[test]
@@ -40,6 +43,7 @@ fn it_sees_what_can_be_seen_without_reading_on() {
         ("never_runs", true),
         // What other files say is not in the schema.
         ("wires_that_do_not_fit", true),
+        ("wire_filters", true),
         ("group", false),
     ] {
         let path = Path::new(env!("CARGO_MANIFEST_DIR")).join(format!("tests/mistakes/{name}.toml"));

@@ -6,10 +6,13 @@ use std::any::Any;
 use std::cell::UnsafeCell;
 use std::sync::Arc;
 
-use types::cdr::NoElement;
+use types::cdr::{NoElement, Writer};
 use types::{Header, Message, Priority, Time};
 
-use super::{Direction, InputEnd, Parcel, Port, PortEnds, PortOptions, PortShape, WireCounts, WireId, count};
+use super::{
+    Direction, InputEnd, OutputEnd, Parcel, Port, PortEnds, PortOptions, PortShape, WireCounts, WireId,
+    count, output_core,
+};
 use crate::memory::{Found, Link, Pin, Seat};
 use crate::message_type::MessageType;
 use crate::ring;
@@ -131,6 +134,19 @@ impl<T: Message> InputEnd for InputCore<T> {
 
     fn message_type(&self) -> &'static MessageType {
         MessageType::of::<T>()
+    }
+
+    fn facing(&self) -> Arc<dyn OutputEnd> {
+        output_core::<T>(&PortOptions::DEFAULT, 1)
+    }
+
+    fn take_cdr(&self) -> Option<Vec<u8>> {
+        let inner = self.inner();
+        let lane = inner.next()?;
+        let received = inner.lanes[lane].current()?;
+        let mut writer = Writer::new();
+        received.encode(received.row(), received.header().stamp, &mut writer);
+        Some(writer.bytes().to_vec())
     }
 }
 

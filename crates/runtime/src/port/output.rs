@@ -15,8 +15,8 @@ use types::{AgentId, Category, Filter, Header, Message, Priority, Time};
 
 use super::input::{Lane, NewLanes, Source};
 use super::{
-    Direction, NoSeat, OutputEnd, OutputFault, Parcel, Port, PortEnds, PortOptions, PortShape, PreparedWire,
-    Target, WireCounts, WireId, WireSpec, count,
+    Direction, InputEnd, NoSeat, OutputEnd, OutputFault, Parcel, Port, PortEnds, PortOptions, PortShape,
+    PreparedWire, Target, WireCounts, WireId, WireSpec, count, input_core,
 };
 use crate::context::current;
 use crate::memory::{self, Link, Seat};
@@ -170,14 +170,18 @@ impl<T: Message> OutputEnd for OutputCore<T> {
         Ok(Box::new(message_type::decode::<T>(bytes)?))
     }
 
-    fn send_prepared(&self, message: &(dyn Any + Send)) {
+    fn send_prepared(&self, envelope: &Envelope, message: &(dyn Any + Send)) {
         let Some((head, row)) = message.downcast_ref::<(T, Vec<T::Element>)>() else { return };
-        self.send(&Envelope::default(), |place, room| {
+        self.send(envelope, |place, room| {
             *place = *head;
             let len = row.len().min(room.len());
             room[..len].copy_from_slice(&row[..len]);
             len
         });
+    }
+
+    fn facing(&self) -> Arc<dyn InputEnd> {
+        input_core::<T>()
     }
 }
 

@@ -26,7 +26,8 @@ impl Router {
             })
         };
         let mut plan = WirePlan::new(name(wire.from), name(wire.to));
-        (plan.depth, plan.overload, plan.filter) = (Some(wire.depth), Some(wire.overload), wire.filter);
+        (plan.depth, plan.overload) = (Some(wire.depth), Some(wire.overload));
+        plan.filter = wire.filter.clone();
         plan
     }
 
@@ -36,19 +37,21 @@ impl Router {
         if self.find_wire(&plan.from, &plan.to).is_some() {
             return Err(Refusal::new(format!("{} is already wired to {}", plan.from, plan.to)));
         }
+        let recipient = plan.filter.recipient.as_ref().map(|name| self.known(name)).transpose()?;
+        let filter = plan.filter.with_recipient(recipient.map(|known| known.id));
         let (out_port, in_port) =
             (&self.agents[from.0].kind.ports[from.1], &self.agents[to.0].kind.ports[to.1]);
         match (out_port.shape.direction, in_port.shape.direction) {
             (Direction::Output, Direction::Input) => {
                 self.check_types(plan, from, to)?;
-                self.join(from, to, plan, plan.filter, false, fabric).map(drop)
+                self.join(from, to, plan, filter, false, fabric).map(drop)
             }
             (Direction::Client, Direction::Service) => {
                 self.check_types(plan, from, to)?;
                 self.check_types(plan, to, from)?;
-                let filter = answers_for(self.agents[from.0].id);
-                let answers = self.join(to, from, plan, filter, true, fabric)?;
-                let calls = self.join(from, to, plan, plan.filter, false, fabric)?;
+                let for_client = answers_for(self.agents[from.0].id);
+                let answers = self.join(to, from, plan, for_client, true, fabric)?;
+                let calls = self.join(from, to, plan, filter, false, fabric)?;
                 if let Some(wire) = self.wires.iter_mut().find(|wire| wire.id == calls) {
                     wire.partner = Some(answers);
                 }
@@ -126,22 +129,17 @@ impl Router {
             door: self.executors[receiver.executor].link.door.clone(),
             wakes,
         };
-        let id = WireId(self.next_wire);
+        let id = self.wire_id();
+        let (sender, receiver) = (&self.agents[from.0], &self.agents[to.0]);
         let counts = Arc::new(WireCounts::default());
         let spec = WireSpec { id, depth, overload, filter, target, counts: counts.clone() };
-        let mut priorities: Vec<Priority> = sender.kind.ports[from.1].options.priorities().collect();
-        priorities.sort_unstable_by(|a, b| b.cmp(a));
-        if priorities.is_empty() {
-            priorities.push(Priority::Normal);
-        }
+        let priorities = sender.priorities(from.1);
         let (from_id, to_id) = ((sender.id, from.1), (receiver.id, to.1));
-        let routes = self.wires.iter().filter(|wire| wire.from == from_id).count();
-        let lanes = self.wires.iter().filter(|wire| wire.to == to_id).count() * Priority::ALL.len();
+        let (routes, lanes) = (self.routes_from(from_id), self.lanes_into(to_id));
         let prepared = output.prepare(&spec, &priorities, routes, lanes).map_err(|NoSeat { seats }| {
             Refusal::new(format!("{} has readers on all {seats} seats of its memory", plan.from))
         })?;
         let (sender_executor, receiver_executor, slot) = (sender.executor, receiver.executor, receiver.slot);
-        self.next_wire += 1;
         self.commit(receiver_executor, Change::Join { end: input, lanes: prepared.lanes, slot }, fabric)?;
         self.commit(sender_executor, Change::Route { end: output, route: prepared.route }, fabric)?;
         self.wires.push(Wire {
@@ -152,13 +150,29 @@ impl Router {
             is_answer,
             depth,
             overload,
-            filter,
+            filter: plan.filter.clone(),
             counts,
         });
         if sender_executor == receiver_executor && wakes {
             self.commit_order(sender_executor, fabric)?;
         }
         Ok(id)
+    }
+
+    pub(super) fn wire_id(&mut self) -> WireId {
+        self.next_wire += 1;
+        WireId(self.next_wire - 1)
+    }
+
+    /// How many routes lead out of a port.
+    pub(super) fn routes_from(&self, port: (AgentId, usize)) -> usize {
+        self.wires.iter().filter(|wire| wire.from == port).count() + self.calls_of(port)
+    }
+
+    /// How many lanes lead into a port at most.
+    pub(super) fn lanes_into(&self, port: (AgentId, usize)) -> usize {
+        let wires = self.wires.iter().filter(|wire| wire.to == port).count();
+        (wires + self.calls_of(port)) * Priority::ALL.len()
     }
 
     pub(super) fn unwire(&mut self, from: &str, to: &str, fabric: &mut dyn Fabric) -> Reply<()> {

@@ -2,16 +2,17 @@
 
 #![allow(clippy::unwrap_used)] // a test may
 
+mod calls;
 mod wall;
 
 use runtime::{
-    Agent, Client, Direction, Fault, FaultKind, Input, Options, Output, Params, Plan, Refusal, Registry,
-    Reply, Request, Service, Simulation, Step, TimedRequest, WirePlan, registry,
+    Agent, Client, Direction, Envelope, Fault, FaultKind, Input, Options, Output, Params, Plan, Refusal,
+    Registry, Reply, Request, Service, Simulation, Step, TimedRequest, WirePlan, registry,
 };
 use std::sync::{Arc, Mutex};
 use types::messages::{Image, Twist};
 use types::value::{Span, Value};
-use types::{Duration, Time};
+use types::{AgentId, Duration, Time};
 
 /// Counts up.
 #[derive(Agent)]
@@ -120,7 +121,7 @@ fn options(millis: i64) -> Options {
 }
 
 fn types() -> Registry {
-    registry![Source, Relay, Sink, Asker, Answerer, Loop, Painter, Viewer]
+    registry![Source, Relay, Sink, Asker, Answerer, Loop, Painter, Viewer, Postman]
 }
 
 /// source → relay → sink, the source every 10 ms.
@@ -208,6 +209,120 @@ fn a_filter_for_every_third_message_counts_each_message_once() {
         let numbers: Vec<i64> = heard(test).iter().map(|(_, twist)| twist.linear as i64).collect();
         assert_eq!(numbers, [1, 4, 7, 10], "{test}");
     }
+}
+
+#[test]
+fn a_least_gap_makes_an_agent_wait_for_messages_and_no_longer() {
+    let mut plan = Plan::new("gap");
+    let source = plan.add::<Source>("source", SourceParams::default());
+    let end = plan.add::<Sink>("sink", sink("gap"));
+    plan.wire(&source.out, &end.count);
+    plan.every("source", Duration::millis(10));
+    plan.on("sink", "count");
+    plan.agent_mut("sink").unwrap().min_gap = Duration::millis(25);
+    plan.requests = vec![
+        at(105, "fault source off"),
+        at(205, "fault source ok"),
+        at(245, "set sink min_gap 0ms"),
+        at(265, "fault source off"),
+    ];
+    let report = Simulation::new(&plan, &types(), options(400)).unwrap().run().unwrap();
+    let heard: Vec<(i64, i64)> =
+        heard("gap").iter().map(|(time, twist)| (time.0 / 1_000_000, twist.linear as i64)).collect();
+    let expected = [
+        // The first at once; then a step each 25 ms, which takes all that has come meanwhile, each message once.
+        [(0, 1)].as_slice(),
+        &[(25, 2), (25, 3)],
+        &[(50, 4), (50, 5), (50, 6)],
+        &[(75, 7), (75, 8)],
+        &[(100, 9), (100, 10), (100, 11)],
+        // After a pause longer than the gap nothing is waited for.
+        &[(210, 12)],
+        &[(235, 13), (235, 14)],
+        // Without a gap the next message makes it run at once, and the step that was put off is not made up for.
+        &[(245, 15)],
+        &[(250, 16)],
+        &[(260, 17)],
+    ];
+    assert_eq!(heard, expected.concat());
+    let steps = &report.view.agents[1];
+    assert_eq!(steps.counts.releases, expected.len() as u64, "no step without a message");
+    assert_eq!((steps.counts.missed, steps.jitter.max), (0, 0.0), "waiting for the gap is not being late");
+}
+
+#[test]
+fn a_least_gap_holds_for_messages_alone() {
+    let mut plan = Plan::new("gap-period");
+    let source = plan.add::<Source>("source", SourceParams::default());
+    let end = plan.add::<Sink>("sink", sink("gap-period"));
+    plan.wire(&source.out, &end.count);
+    plan.every("source", Duration::millis(10));
+    plan.on("sink", "count");
+    plan.every("sink", Duration::millis(50));
+    plan.agent_mut("sink").unwrap().min_gap = Duration::millis(30);
+    let report = Simulation::new(&plan, &types(), options(199)).unwrap().run().unwrap();
+    let mut steps: Vec<i64> = heard("gap-period").iter().map(|(time, _)| time.0 / 1_000_000).collect();
+    steps.dedup();
+    // By the clock at 0, 50, 100, 150; by messages 30 ms after the last step, whatever that was for.
+    assert_eq!(steps, [0, 30, 50, 80, 100, 130, 150, 180]);
+    assert_eq!(report.view.agents[1].counts.releases, steps.len() as u64);
+}
+
+/// Sends to the agents with the numbers 1 and 2 and to everybody, in turn.
+#[derive(Agent)]
+struct Postman {
+    /// The count, as a speed.
+    out: Output<Twist>,
+    n: u32,
+}
+
+impl Agent for Postman {
+    fn step(&mut self, _: &mut Step) -> Result<(), Fault> {
+        self.n += 1;
+        let recipient = [AgentId::NONE, AgentId(1), AgentId(2)][self.n as usize % 3];
+        let envelope = Envelope { recipient, ..Envelope::default() };
+        self.out.send_as(envelope, Twist::new(f64::from(self.n), 0.0));
+        Ok(())
+    }
+}
+
+#[test]
+fn a_filter_for_a_recipient_passes_what_is_for_it_or_for_everybody() {
+    let mut plan = Plan::new("recipients");
+    plan.add::<Postman>("postman", Default::default());
+    plan.every("postman", Duration::millis(10));
+    for (name, recipient) in [("one", Some("one")), ("two", Some("two")), ("all", None), ("spy", Some("one"))]
+    {
+        plan.add::<Sink>(name, sink(&format!("recipients-{name}")));
+        plan.on(name, "count");
+        let mut wire = WirePlan::new("postman.out", format!("{name}.count"));
+        wire.filter.recipient = recipient.map(str::to_owned);
+        plan.wires.push(wire);
+    }
+    plan.requests = vec![at(55, "remove one"), at(56, "unwire postman.out spy.count"), at(57, "remove one")];
+    let report = Simulation::new(&plan, &types(), options(80)).unwrap().run().unwrap();
+    let heard = |name: &str| -> Vec<f64> {
+        heard(&format!("recipients-{name}")).iter().map(|(_, twist)| twist.linear).collect()
+    };
+    assert_eq!(heard("one"), [1.0, 3.0, 4.0, 6.0]);
+    assert_eq!(heard("two"), [2.0, 3.0, 5.0, 6.0, 8.0, 9.0]);
+    assert_eq!(heard("all"), (1..10).map(f64::from).collect::<Vec<_>>());
+    assert_eq!(heard("spy"), heard("one"), "whoever is wired so hears what is for another");
+    let said: Vec<&str> = report.incidents.iter().map(|incident| incident.what.as_str()).collect();
+    let refused = "asked: remove one; refused: the wire from postman.out to spy.count takes what is for one";
+    assert_eq!(
+        said,
+        [
+            &format!("{refused}; cut that wire first"),
+            "asked: unwire postman.out spy.count",
+            "asked: remove one"
+        ]
+    );
+    assert_eq!(report.view.wires[0].filter.recipient.as_deref(), Some("two"), "people see the name");
+
+    plan.wires[0].filter.recipient = Some("oen".into());
+    let said = Simulation::new(&plan, &types(), options(80)).map(drop).unwrap_err().to_string();
+    assert_eq!(said, "the plan has 1 mistakes, the first: there is no agent \"oen\"; did you mean \"one\"?");
 }
 
 #[test]

@@ -1,7 +1,11 @@
 //! On the wall clock. What is claimed is what arrives and who survives, never how fast.
 
-use runtime::{Live, Observer, Options, Request, Verdict, WirePlan};
+use runtime::{
+    Agent, Fault, Live, Observer, Options, Output, Plan, Request, Step, Verdict, WirePlan, registry,
+};
+use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Arc, Mutex};
+use types::messages::Twist;
 use types::{Duration, Time};
 
 use crate::{Sink, Source, SourceParams, chain, heard, options, sink, types};
@@ -123,4 +127,83 @@ fn requests_change_a_running_system_and_are_refused_with_reasons() {
     other.unwrap().join().unwrap();
     assert_eq!(report.ended, "asked to quit");
     assert_eq!(*refused.lock().unwrap(), ["ok", "ok", "ok", "there is no agent \"relay\"", "ok"]);
+}
+
+/// Steps of [`Busy`], and what keeps it busy.
+static BUSY_STEPS: AtomicU64 = AtomicU64::new(0);
+static WORK: AtomicU64 = AtomicU64::new(0);
+
+/// Keeps its processor busy for some milliseconds.
+#[derive(Agent)]
+struct Busy {
+    /// Nothing.
+    out: Output<Twist>,
+}
+
+impl Agent for Busy {
+    fn step(&mut self, _: &mut Step) -> Result<(), Fault> {
+        for n in 0..300_000 {
+            WORK.fetch_add(n, Ordering::Relaxed);
+        }
+        BUSY_STEPS.fetch_add(1, Ordering::Relaxed);
+        Ok(())
+    }
+}
+
+/// Is at work until another has done three steps meanwhile.
+#[derive(Agent)]
+struct Patient {
+    /// A message when a step is done.
+    out: Output<Twist>,
+}
+
+impl Agent for Patient {
+    fn step(&mut self, _: &mut Step) -> Result<(), Fault> {
+        let begun = BUSY_STEPS.load(Ordering::Relaxed);
+        // Without a priority on either side the other may not come at all; then this goes on after some seconds.
+        for _ in 0..3_000_000_000u64 {
+            if BUSY_STEPS.load(Ordering::Relaxed) >= begun + 3 {
+                break;
+            }
+            std::hint::spin_loop();
+        }
+        self.out.send(Twist::ZERO);
+        Ok(())
+    }
+}
+
+#[test]
+fn what_higher_executors_take_from_a_step_is_not_its_execution_time() {
+    let types = registry![Busy, Patient, Sink];
+    let mut plan = Plan::new("pre-empted");
+    plan.add::<Busy>("busy", Default::default());
+    let patient = plan.add::<Patient>("patient", Default::default());
+    let end = plan.add::<Sink>("sink", sink("pre-empted"));
+    plan.wire(&patient.out, &end.count);
+    plan.on("sink", "count");
+    plan.every("busy", Duration::millis(10));
+    plan.every("patient", Duration::millis(100));
+    for (agent, priority) in [("busy", 42), ("patient", 41)] {
+        let mut executor = runtime::ExecutorPlan::new(agent, Some(priority));
+        executor.cpus = vec![0];
+        plan.executors.push(executor);
+        let agent = plan.agent_mut(agent).unwrap();
+        agent.executor = Some(agent.name.clone());
+        agent.hang_after = Some(Duration::secs(15));
+    }
+    let report = Live::new(&plan, &types, until("pre-empted", "", 5)).unwrap().run().unwrap();
+    let [busy, patient, _] = &report.view.agents[..] else { panic!("{report:#?}") };
+    if busy.granted != "fifo 42" || patient.granted != "fifo 41" {
+        println!("skipped: asked for fifo, granted {} and {}", busy.granted, patient.granted);
+        return;
+    }
+    // From the release to the end, less from the release to the beginning: the steps as they looked from outside.
+    let sum = |figure: &runtime::Figure| figure.mean * figure.n as f64;
+    let (elapsed, own) = (sum(&patient.response) - sum(&patient.jitter), sum(&patient.exec));
+    // In each step of the lower one lie three whole steps of the higher one, and those are not its own.
+    let taken = 3.0 * patient.exec.n as f64 * busy.exec.min;
+    assert!(own <= elapsed - taken, "{own} of {elapsed}, and {taken} were another's");
+    let counts = patient.counts;
+    assert!(counts.checked > 0 && counts.checked + counts.left_out <= counts.releases, "{counts:?}");
+    assert_eq!(patient.exec.n + counts.left_out, counts.releases);
 }

@@ -1,10 +1,12 @@
-//! The run folder: where running systems leave what other processes of the same user may find.
+//! The run folder: where running systems leave what other processes of the same user may find, as sockets and latches.
 
 use std::ffi::OsString;
 use std::fs;
 use std::io;
 use std::os::unix::fs::{DirBuilderExt, MetadataExt};
 use std::path::{Path, PathBuf};
+
+use crate::os;
 
 /// Why there is no run folder.
 #[derive(Debug, thiserror::Error)]
@@ -17,7 +19,7 @@ pub enum FolderError {
         /// What the system says.
         cause: io::Error,
     },
-    /// It belongs to somebody else, or others may write to it.
+    /// It belongs to somebody else, or others have rights to it.
     #[error(
         "the run folder {path} is not safe: {why}; remove it, or set XDG_RUNTIME_DIR to a folder of your own"
     )]
@@ -46,9 +48,9 @@ impl RunFolder {
 
     /// Where [`open`](Self::open) looks for a value of `XDG_RUNTIME_DIR`.
     fn place(runtime: Option<OsString>) -> PathBuf {
-        match runtime.filter(|folder| Path::new(folder).is_absolute()) {
-            Some(folder) => Path::new(&folder).join("sinew"),
-            None => PathBuf::from(format!("/dev/shm/sinew-{}", rustix::process::geteuid().as_raw())),
+        match runtime.map(PathBuf::from).filter(|folder| folder.is_absolute()) {
+            Some(folder) => folder.join("sinew"),
+            None => PathBuf::from(format!("/dev/shm/sinew-{}", os::user())),
         }
     }
 
@@ -68,7 +70,7 @@ impl RunFolder {
         if !found.is_dir() {
             return bad("it is no folder");
         }
-        if found.uid() != rustix::process::geteuid().as_raw() {
+        if found.uid() != os::user() {
             return bad("it belongs to another user");
         }
         if found.mode() & 0o077 != 0 {
@@ -81,19 +83,28 @@ impl RunFolder {
     pub fn path(&self) -> &Path {
         &self.path
     }
+
+    /// The path of the file of what is called `names`, say a system and its robot. Whatever the names are made of, the file lies
+    /// in this folder, and other names have another file.
+    pub fn file(&self, names: &[&str], ending: &str) -> PathBuf {
+        let mut file = String::new();
+        for name in names {
+            push_word(&mut file, name);
+            file.push('.');
+        }
+        self.path.join(file + ending)
+    }
 }
 
-/// A name as a part of a file name: whatever is not a letter, a digit, `_` or `-` is written as `%` and its number.
-pub(super) fn file_word(name: &str) -> String {
-    let mut word = String::with_capacity(name.len());
+/// Adds a name as a part of a file name: whatever is not a letter, a digit, `_` or `-` is written as `%` and its number.
+fn push_word(file: &mut String, name: &str) {
     for byte in name.bytes() {
         if byte.is_ascii_alphanumeric() || byte == b'_' || byte == b'-' {
-            word.push(char::from(byte));
+            file.push(char::from(byte));
         } else {
-            word.push_str(&format!("%{byte:02x}"));
+            file.push_str(&format!("%{byte:02x}"));
         }
     }
-    word
 }
 
 #[cfg(test)]
@@ -101,33 +112,43 @@ mod tests {
     use std::os::unix::fs::PermissionsExt;
 
     use super::*;
-    use crate::scratch::Scratch;
 
     #[test]
     fn it_lies_where_the_session_says_else_in_shared_memory() {
         assert_eq!(RunFolder::place(Some("/run/user/7".into())), PathBuf::from("/run/user/7/sinew"));
         let other = RunFolder::place(None);
-        assert!(other.starts_with("/dev/shm"), "{other:?}");
+        assert_eq!(other, PathBuf::from(format!("/dev/shm/sinew-{}", os::user())));
         assert_eq!(RunFolder::place(Some("not/absolute".into())), other);
     }
 
     #[test]
-    fn it_is_made_for_its_owner_alone_and_one_that_others_can_read_is_refused() {
-        let scratch = Scratch::new("folder");
-        let path = scratch.path().join("run");
+    fn it_is_made_for_its_owner_alone_and_others_are_refused() {
+        let scratch = std::env::temp_dir().join(format!("sinew-folder-{}", std::process::id()));
+        fs::create_dir_all(&scratch).unwrap();
+        let path = scratch.join("sinew");
         let folder = RunFolder::at(&path).unwrap();
-        assert_eq!(fs::metadata(folder.path()).unwrap().mode() & 0o777, 0o700);
-        fs::set_permissions(&path, fs::Permissions::from_mode(0o755)).unwrap();
+        let found = fs::metadata(folder.path()).unwrap();
+        assert_eq!((found.mode() & 0o777, found.uid()), (0o700, os::user()));
+        assert_eq!(RunFolder::at(&path).unwrap(), folder, "the second time it is there already");
+
+        fs::set_permissions(&path, fs::Permissions::from_mode(0o750)).unwrap();
         assert!(matches!(RunFolder::at(&path), Err(FolderError::Unsafe { .. })));
-        let link = scratch.path().join("link");
-        std::os::unix::fs::symlink(scratch.path(), &link).unwrap();
+        let link = scratch.join("link");
+        std::os::unix::fs::symlink(&scratch, &link).unwrap();
         assert!(matches!(RunFolder::at(&link), Err(FolderError::Unsafe { .. })));
+        fs::write(scratch.join("file"), "").unwrap();
+        assert!(matches!(RunFolder::at(&scratch.join("file")), Err(FolderError::Unsafe { .. })));
+        assert!(matches!(RunFolder::at(&scratch.join("no/where")), Err(FolderError::Io { .. })));
+        fs::remove_dir_all(&scratch).unwrap();
     }
 
     #[test]
-    fn no_two_names_share_a_file_word() {
-        assert_eq!(file_word("lab-1_a"), "lab-1_a");
-        assert_eq!(file_word("../a.b"), "%2e%2e%2fa%2eb");
-        assert_ne!(file_word("a%2eb"), file_word("a.b"));
+    fn no_two_names_share_a_file_and_none_leaves_the_folder() {
+        let folder = RunFolder { path: PathBuf::from("/run") };
+        assert_eq!(folder.file(&["lab-1_a"], "sock"), Path::new("/run/lab-1_a.sock"));
+        assert_eq!(folder.file(&["../a b"], "sock"), Path::new("/run/%2e%2e%2fa%20b.sock"));
+        assert_eq!(folder.file(&["lab", "h1"], "latch"), Path::new("/run/lab.h1.latch"));
+        assert_ne!(folder.file(&["lab.h1"], "latch"), folder.file(&["lab", "h1"], "latch"));
+        assert_ne!(folder.file(&["a%2eb"], "sock"), folder.file(&["a.b"], "sock"));
     }
 }

@@ -1,0 +1,243 @@
+//! Calls from outside: a service is called by somebody who is no agent, and no wire of the system is touched.
+//!
+//! ```text
+//!   control side                              the service's executor
+//!   call ── join, send ─────────────────────▶ its mailbox ─▶ its step
+//!   answer, or time-out ◀── a ring of its own ◀───────────── its answer
+//!   end  ── forget, leave ──────────────────▶
+//! ```
+//!
+//! Each call has ends of its own and a number of its own as sender, so no answer is taken for another, however late it comes.
+
+use std::sync::Arc;
+use std::sync::mpsc::SyncSender;
+
+use types::definition::Definition;
+use types::{AgentId, Category, Duration, Filter, Priority, Time};
+
+use super::{AgentState, Fabric, Reply, Router};
+use crate::executor::Change;
+use crate::port::{
+    Direction, Envelope, InputEnd, NoSeat, OutputEnd, PreparedWire, Target, WireCounts, WireId, WireSpec,
+};
+use crate::request::Refusal;
+use crate::ring::Overload;
+use crate::service::answers_for;
+
+/// How many calls from outside can be under way. Each holds two rings; people and scripts make a few.
+const CALLS: usize = 64;
+
+/// What a service takes and gives.
+#[derive(Clone, Debug)]
+pub struct ServiceShape {
+    /// What is asked.
+    pub question: Definition,
+    /// What is answered.
+    pub answer: Definition,
+}
+
+/// A call from outside, as it is asked for.
+#[derive(Debug)]
+pub(crate) struct OutsideCall {
+    pub service: String,
+    /// The question, as CDR.
+    pub cdr: Vec<u8>,
+    pub within: Duration,
+    /// Who waits for the answer.
+    pub asker: SyncSender<Reply<Vec<u8>>>,
+}
+
+impl OutsideCall {
+    /// What is asked, for the log.
+    pub(crate) fn said(&self) -> String {
+        format!("Call {{ service: {:?}, cdr: {:?}, within: {} }}", self.service, self.cdr, self.within)
+    }
+}
+
+/// A call from outside that is under way.
+pub(super) struct UnderWay {
+    call: OutsideCall,
+    deadline: Time,
+    agent: AgentId,
+    port: usize,
+    question: WireId,
+    answer: WireId,
+    /// Where the answer comes in. Only the control side touches it.
+    answers: Arc<dyn InputEnd>,
+}
+
+/// The agent, the port and the ends of a service.
+type Ends = (usize, usize, Arc<dyn InputEnd>, Arc<dyn OutputEnd>);
+
+impl Router {
+    /// What a service takes and gives.
+    pub(crate) fn service(&self, port: &str) -> Reply<ServiceShape> {
+        let (_, _, calls, answers) = self.service_ends(port)?;
+        Ok(ServiceShape {
+            question: (calls.message_type().definition)(),
+            answer: (answers.message_type().definition)(),
+        })
+    }
+
+    fn service_ends(&self, name: &str) -> Reply<Ends> {
+        let unknown = |agent: &super::Known, port: &str| {
+            let services = agent.kind.ports.iter().filter(|port| port.shape.direction == Direction::Service);
+            let services: Vec<&str> = services.map(|port| port.name).collect();
+            let what = format!("service of {}", agent.plan.name);
+            Refusal::unknown(&what, port, services)
+        };
+        let (agent, port) = self.port(name).or_else(|refusal| match name.rsplit_once('.') {
+            Some((agent, port)) => Err(unknown(self.known(agent)?, port)),
+            None => Err(refusal),
+        })?;
+        let known = &self.agents[agent];
+        let (shape, ends) = (&known.kind.ports[port], &known.ends[port]);
+        match (shape.shape.direction, &ends.input, &ends.output) {
+            (Direction::Service, Some(calls), Some(answers)) => {
+                Ok((agent, port, calls.clone(), answers.clone()))
+            }
+            _ => Err(unknown(known, shape.name)),
+        }
+    }
+
+    /// Begins a call. Its answer, or the news that none came, goes to the asker later; a refusal goes there at once.
+    pub(crate) fn call(&mut self, call: OutsideCall, now: Time, fabric: &mut dyn Fabric) -> Reply<()> {
+        let asker = call.asker.clone();
+        self.begin_call(call, now, fabric).inspect_err(|refusal| {
+            // Whoever asked may be gone.
+            let _ = asker.send(Err(refusal.clone()));
+        })
+    }
+
+    fn begin_call(&mut self, call: OutsideCall, now: Time, fabric: &mut dyn Fabric) -> Reply<()> {
+        let (agent, port, calls, answers) = self.service_ends(&call.service)?;
+        let known = &self.agents[agent];
+        if known.state == AgentState::Dead {
+            return Err(Refusal::new(format!("{} is dead and answers no calls", known.plan.name))
+                .help("restart it, and call again"));
+        }
+        if self.calls.len() >= CALLS {
+            return Err(Refusal::new(format!("{CALLS} calls from outside are under way already"))
+                .help("wait for the answers"));
+        }
+        let (executor, slot, id) = (known.executor, known.slot, known.id);
+        let deadline = now.saturating_add(call.within);
+        // Numbers from the other end: those of agents stay what they are without the call.
+        self.next_caller -= 1;
+        let caller = AgentId(self.next_caller);
+
+        let questions = calls.facing();
+        questions.set_sender(caller);
+        let message =
+            questions.prepare_message(&call.cdr).map_err(|error| Refusal::new(error.to_string()))?;
+        let wakes = known.plan.on.iter().any(|on| on == known.kind.ports[port].name);
+        let asking = self.spec(executor, slot, wakes, Filter::ALL);
+        let lanes = self.lanes_into((id, port));
+        let PreparedWire { mut route, lanes } = prepared(&questions, &asking, &[Priority::Normal], 0, lanes)?;
+        // Nobody else has these ends yet, so they are touched here.
+        questions.add_route(route.as_mut());
+
+        let facing = answers.facing();
+        let answering = self.spec(executor, slot, false, answers_for(caller));
+        let priorities = self.agents[agent].priorities(port);
+        let routes = self.routes_from((id, port));
+        let PreparedWire { route, lanes: mut back } = prepared(&answers, &answering, &priorities, routes, 0)?;
+        facing.join(back.as_mut());
+
+        let envelope = Envelope { deadline, marker: 1, category: Category::Call, ..Envelope::default() };
+        let (question, answer) = (asking.id, answering.id);
+        let under_way = UnderWay { call, deadline, agent: id, port, question, answer, answers: facing };
+        let asked = self
+            .commit(executor, Change::Route { end: answers, route }, fabric)
+            .and_then(|()| self.commit(executor, Change::Join { end: calls, lanes, slot }, fabric))
+            .and_then(|()| self.commit(executor, Change::Send { end: questions, message, envelope }, fabric));
+        match asked {
+            Ok(()) => self.calls.push(under_way),
+            Err(_) => self.hang_up(&under_way, fabric),
+        }
+        asked
+    }
+
+    /// A wire for one message to or from the agent in a slot.
+    fn spec(&mut self, executor: usize, slot: u32, wakes: bool, filter: Filter) -> WireSpec {
+        let door = self.executors[executor].link.door.clone();
+        let target = Target { executor: executor as u32, slot, door, wakes };
+        let counts = Arc::new(WireCounts::default());
+        WireSpec { id: self.wire_id(), depth: 1, overload: Overload::Refuse, filter, target, counts }
+    }
+
+    /// Passes on the answers that have come, and tells those who have waited long enough. Gives the time of the next deadline.
+    pub(crate) fn answer_calls(&mut self, now: Time, fabric: &mut dyn Fabric) -> Time {
+        let mut next = Time::NEVER;
+        let mut at = 0;
+        while let Some(under_way) = self.calls.get(at) {
+            let outcome = match under_way.answers.take_cdr() {
+                Some(cdr) => Ok(cdr),
+                None if under_way.deadline <= now => Err(too_late(&under_way.call)),
+                None => {
+                    next = next.min(under_way.deadline);
+                    at += 1;
+                    continue;
+                }
+            };
+            let under_way = self.calls.remove(at);
+            // Whoever asked may be gone.
+            let _ = under_way.call.asker.send(outcome);
+            self.hang_up(&under_way, fabric);
+        }
+        next
+    }
+
+    /// Whether anybody outside waits for an answer.
+    pub(crate) fn has_calls(&self) -> bool {
+        !self.calls.is_empty()
+    }
+
+    /// Takes the ends of a call away from the service. What an executor that does not answer keeps goes with the agent.
+    fn hang_up(&mut self, under_way: &UnderWay, fabric: &mut dyn Fabric) {
+        let Some(known) = self.by_id(under_way.agent) else { return };
+        let (executor, ends) = (known.executor, known.ends[under_way.port].clone());
+        if let Some(end) = ends.output {
+            let into = end.forgetting_box();
+            let _ = self.commit(executor, Change::Forget { end, wire: under_way.answer, into }, fabric);
+        }
+        if let Some(end) = ends.input {
+            let _ = self.leave(executor, end, under_way.question, true, fabric);
+        }
+    }
+
+    /// The agent is about to go, and with it all that its callers wait for.
+    pub(super) fn end_calls_of(&mut self, agent: AgentId) {
+        self.calls.retain(|under_way| {
+            if under_way.agent == agent {
+                let what = format!("{} was removed before it answered", under_way.call.service);
+                // Whoever asked may be gone.
+                let _ = under_way.call.asker.send(Err(Refusal::new(what)));
+            }
+            under_way.agent != agent
+        });
+    }
+
+    /// How many calls from outside go to a port.
+    pub(super) fn calls_of(&self, port: (AgentId, usize)) -> usize {
+        self.calls.iter().filter(|under_way| (under_way.agent, under_way.port) == port).count()
+    }
+}
+
+fn prepared(
+    output: &Arc<dyn OutputEnd>,
+    spec: &WireSpec,
+    priorities: &[Priority],
+    routes: usize,
+    lanes: usize,
+) -> Reply<PreparedWire> {
+    output.prepare(spec, priorities, routes, lanes).map_err(|NoSeat { seats }| {
+        Refusal::new(format!("the answers have readers on all {seats} seats of their memory"))
+    })
+}
+
+fn too_late(call: &OutsideCall) -> Refusal {
+    let agent = crate::plan::owner(&call.service);
+    Refusal::new(format!("{} did not answer within {}", call.service, call.within))
+        .help(format!("see whether {agent} runs and takes its calls"))
+}
