@@ -7,6 +7,7 @@
 //! |---|---|
 //! | [`kinematics`] | wheel speeds for a motion of the body, and back |
 //! | [`odometry`] | where the body is, from wheel counters |
+//! | [`heading`] | how far the body turned, from a gyro and the wheels |
 //! | [`motor`] | how a wheel under speed control follows its set point |
 //! | [`limits`] | what of a wish can be driven |
 //! | [`fuzzy`] | terms, hedges, inference |
@@ -15,9 +16,7 @@
 //! | [`ring`] | ranges around the robot, of a few sonars or of a laser |
 //! | [`safety`] | how fast is still safe, and where there is room |
 //! | [`wall`] | steering along a wall |
-//! | [`island`] | a wall follower that leaves islands |
 //! | [`boundary`] | which ways a body fits through, and which of them is along the wall |
-//! | [`roam`] | along the walls of an unknown place, leaving what was circled |
 //! | [`pursuit`] | following what a camera on a turning head sees |
 #![no_std]
 #![forbid(unsafe_code)]
@@ -28,14 +27,13 @@ extern crate std;
 pub mod boundary;
 pub mod fusion;
 pub mod fuzzy;
-pub mod island;
+pub mod heading;
 pub mod kinematics;
 pub mod limits;
 pub mod motor;
 pub mod odometry;
 pub mod pursuit;
 pub mod ring;
-pub mod roam;
 pub mod safety;
 pub mod wall;
 pub mod word;

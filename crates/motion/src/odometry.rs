@@ -70,6 +70,11 @@ impl Odometer {
 
     /// Takes the totals of both counters. The first reading only sets the start and gives no motion.
     pub fn update(&mut self, left: i64, right: i64) -> Increment {
+        self.update_with(left, right, |step| step.turn)
+    }
+
+    /// Likewise, with the turn (rad) that something better than counting makes of what the wheels say.
+    pub fn update_with(&mut self, left: i64, right: i64, turn: impl FnOnce(Increment) -> f64) -> Increment {
         let Some((last_left, last_right)) = self.last.replace((left, right)) else {
             return Increment::default();
         };
@@ -78,10 +83,11 @@ impl Odometer {
             self.metres(last_left, left, drive.left_radius),
             self.metres(last_right, right, drive.right_radius),
         );
-        let step = Increment {
+        let mut step = Increment {
             distance: (metres_left + metres_right) / 2.0,
             turn: (metres_right - metres_left) / drive.track,
         };
+        step.turn = turn(step);
         self.spread(step, fabs(metres_left), fabs(metres_right));
         self.pose = self.pose.along_arc(step.distance, step.turn);
         self.travelled += fabs(step.distance);

@@ -1,4 +1,4 @@
-//! Wall following on a ring of ranges: the law that looks at one reading. [`crate::island`] adds the memory.
+//! Wall following on a ring of ranges: a law that looks at one reading and remembers nothing.
 //!
 //! Mirrored so that the wall is always on the left, the wall on the right being its image.
 //!
