@@ -44,6 +44,8 @@ pub enum Condition {
 #[derive(Clone, Debug, PartialEq)]
 pub struct Progress {
     stage: usize,
+    /// When the first stages were met.
+    passed: [Time; TOLD],
     began: Option<f64>,
     held: Duration,
     followed: Duration,
@@ -51,6 +53,9 @@ pub struct Progress {
     measure: Option<f64>,
     state: State,
 }
+
+/// Of so many stages the time is told at which they were met.
+const TOLD: usize = 12;
 
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum State {
@@ -116,6 +121,7 @@ impl Goal {
     pub fn begin(&self) -> Progress {
         Progress {
             stage: 0,
+            passed: [Time::ZERO; TOLD],
             began: None,
             held: Duration::ZERO,
             followed: Duration::ZERO,
@@ -145,7 +151,11 @@ impl Goal {
                 progress.held = Duration(progress.held.0 + PHYSICS_STEP.0);
                 break;
             }
-            *progress = Progress { stage: progress.stage + 1, ..self.begin() };
+            let mut passed = progress.passed;
+            if let Some(place) = passed.get_mut(progress.stage) {
+                *place = world.time();
+            }
+            *progress = Progress { stage: progress.stage + 1, passed, ..self.begin() };
         }
         if progress.stage >= self.stages.len() {
             progress.state = State::Met(world.time());
@@ -192,6 +202,11 @@ impl Progress {
     /// The number of stages that are behind.
     pub fn stages_done(&self) -> usize {
         self.stage
+    }
+
+    /// When the stages that are behind were met, as far as is told: the first twelve.
+    pub fn passed(&self) -> &[Time] {
+        &self.passed[..self.stage.min(TOLD)]
     }
 
     fn holds(&mut self, condition: &Condition, world: &Simulator, robot: RobotId, began: f64) -> bool {

@@ -1,6 +1,6 @@
 //! People: they stand, walk their way-points, appear when a robot comes, and lead it.
 
-use types::geometry::Pose;
+use types::geometry::{PI, Pose};
 use types::{Duration, Point, Time};
 
 use crate::field::Field;
@@ -9,6 +9,10 @@ use crate::robot::{Robot, STEP};
 
 /// People keep this far from a robot (m, surface to surface): they never walk into one.
 pub const POLITE: f64 = 0.15;
+/// Within this of a place where a robot stands a person has come there (m): both side by side.
+const PLACE: f64 = 0.8;
+/// How far aside a person looks for a way around a robot (rad): 30°, 60° and 90°.
+const ASIDE: [f64; 3] = [PI / 6.0, PI / 3.0, PI / 2.0];
 
 /// A person in the world.
 #[derive(Clone, Debug)]
@@ -102,24 +106,46 @@ impl Walker {
         let to = self.plan.walk[self.leg].to;
         let way = to - self.at;
         let (left, most) = (way.norm(), self.plan.speed * STEP);
-        let next = if left <= most { to } else { self.at + way * (most / left) };
-        if !self.free(next, robots) {
+        let straight = if left <= most { to } else { self.at + way * (most / left) };
+        let next = if self.free(straight, robots) {
+            straight
+        } else if left < PLACE && !self.free(to, robots) {
+            // A robot stands in that place: this is as near as it gets.
+            self.arrive();
             return 0.0;
-        }
-        if left <= most {
-            self.begins = None;
-            self.leg += 1;
-            if self.plan.repeat && self.leg == self.plan.walk.len() {
-                self.leg = 0;
-            }
+        } else {
+            let Some(aside) = self.around(way.bearing(), most, robots, field) else { return 0.0 };
+            aside
+        };
+        if next == to {
+            self.arrive();
         }
         if self.plan.gap.is_none() && left > 0.0 {
             self.facing = way.bearing();
         }
+        let moved = next.distance(self.at);
         self.walking = true;
         self.at = next;
         field.place_body(self.body, next);
-        left.min(most)
+        moved
+    }
+
+    /// The next leg.
+    fn arrive(&mut self) {
+        self.begins = None;
+        self.leg += 1;
+        if self.plan.repeat && self.leg == self.plan.walk.len() {
+            self.leg = 0;
+        }
+    }
+
+    /// A step around a robot that stands in the way: the one that leads least aside, without touching anything.
+    fn around(&self, ahead: f64, step: f64, robots: &[Robot], field: &Field) -> Option<Point> {
+        ASIDE.iter().flat_map(|aside| [ahead + aside, ahead - aside]).find_map(|bearing| {
+            let next = self.at + Point::polar(step, bearing);
+            let touches = field.nearest(next, self.plan.radius, self.plan.height, self.body).is_some();
+            (!touches && self.free(next, robots)).then_some(next)
+        })
     }
 
     /// Whether no robot would be too near at `next`, or the step at least leads away from it.

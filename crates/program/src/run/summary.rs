@@ -17,6 +17,8 @@ pub(crate) struct RobotOutcome {
     pub(crate) name: String,
     /// What the judge knows; nothing for a robot that is not simulated.
     pub(crate) truth: Option<sim::Truth>,
+    /// When it met the stages of its goal that are behind it.
+    pub(crate) passed: Vec<Time>,
     pub(crate) commands: u64,
     pub(crate) stale: u64,
     pub(crate) clamped: u64,
@@ -63,6 +65,7 @@ impl Summary {
             .map(|robot| RobotOutcome {
                 name: robot.name.clone(),
                 truth: truth.and_then(|truth| truth.robot(&robot.name)).map(|moment| moment.truth),
+                passed: truth.map_or_else(Vec::new, |truth| truth.passed(&robot.name)),
                 commands: robot.counts.commands.get(),
                 stale: robot.counts.stale.get(),
                 clamped: robot.counts.clamped.get(),
@@ -134,6 +137,12 @@ impl Summary {
         self.agents.iter().map(of).sum()
     }
 
+    /// When the stages that the first robot with a goal has behind it were met (s of the run).
+    fn stages(&self) -> Vec<f64> {
+        let robot = self.robots.iter().find(|robot| !robot.passed.is_empty());
+        robot.map_or_else(Vec::new, |robot| robot.passed.iter().map(|at| at.seconds()).collect())
+    }
+
     /// The documented shape of a run.
     pub(crate) fn to_json(&self) -> Json {
         let agents: Vec<Json> = self.agents.iter().map(agent_json).collect();
@@ -148,7 +157,7 @@ impl Summary {
             "time_s": self.time.seconds(),
             "wall_s": self.wall,
             "ended": self.ended,
-            "goal": {"met": self.met, "why": self.why},
+            "goal": {"met": self.met, "why": self.why, "stages_s": self.stages()},
             "collisions": self.collisions(),
             "closest_m": self.closest(),
             "distance_m": self.distance(),
@@ -189,6 +198,11 @@ impl Summary {
             line(format!("  ended        {}", self.ended));
         }
         line(format!("  time         {}", self.times()));
+        let stages = self.stages();
+        if !stages.is_empty() {
+            let at: Vec<String> = stages.iter().map(|at| format!("{at:.0} s")).collect();
+            line(format!("  stages       met after {}", at.join(", ")));
+        }
         for robot in &self.robots {
             robot_lines(robot, self.robots.len() > 1).into_iter().for_each(&mut line);
         }
@@ -385,6 +399,9 @@ fn agent_json(agent: &AgentView) -> Json {
         "stalled": agent.counts.stalled,
         "skipped": agent.counts.skipped,
         "restarts": agent.counts.restarts,
+        "left_out": agent.counts.left_out,
+        "checked": agent.counts.checked,
+        "disagreed": agent.counts.disagreed,
         "exec": figure_json("exec", &agent.exec),
         "jitter": figure_json("jitter", &agent.jitter),
         "response": figure_json("response", &agent.response),
