@@ -217,7 +217,7 @@ impl Watch {
         }
         let mut room = [(0.0, 0.0); POINTS];
         let mut len = 0;
-        let points = self.map.around(pose, params.radius + params.horizon, stamp);
+        let points = self.map.around(pose, params.radius + params.horizon, stamp, 1);
         for (out, point) in room.iter_mut().zip(points) {
             *out = (point.bearing(), point.norm());
             len += 1;

@@ -1,9 +1,8 @@
 //! The wall follower: along the walls, through every gap that is wide enough, and away from what it only circles.
 
-use libm::sin;
-use motion::odometry::Increment;
-use motion::roam::{Beside, Parameters, Roamer};
 use motion::wall::Side;
+use navigation::ground::{Ground, Seen};
+use navigation::roam::{Beside, Parameters, Roamer};
 use perception::local_map::{LocalMap, MapParams};
 use runtime::{Agent, Fault, Input, Output, Step};
 use types::geometry::{PI, wrap};
@@ -34,11 +33,11 @@ pub struct WallParams {
     /// Way that must be free ahead (m). 0.65 is more than the body is long; a niche that is not deeper is taken for wall.
     #[param(default = 0.65, min = 0.05, max = 3.0)]
     pub look: f64,
-    /// Speed with all free (m/s). 0.4 lets an error of direction fall to 1/e within half of the distance that is kept.
-    #[param(default = 0.4, min = 0.0, max = 5.0)]
+    /// Speed with all free (m/s). 0.55 lets an error of direction fall to 1/e within two thirds of the distance that is kept.
+    #[param(default = 0.55, min = 0.0, max = 5.0)]
     pub speed: f64,
-    /// How fast the wished speed grows while all is free (m/s²). 0.3 takes a second and a half to full speed.
-    #[param(default = 0.3, min = 0.0, max = 5.0)]
+    /// How fast the wished speed grows while all is free (m/s²). 0.4 takes a second and a half to full speed.
+    #[param(default = 0.4, min = 0.0, max = 5.0)]
     pub growth: f64,
     /// Distance from the rim up to which a thing may be nearer than it is told (m). 0.17: a sonar tells 0.15 m of all that is nearer.
     #[param(default = 0.17, min = 0.0, max = 2.0)]
@@ -46,7 +45,13 @@ pub struct WallParams {
     /// How long what was near is remembered while no sensor hears it (time). 30 s is how long a robot may turn about in a corner; on so short a way the odometry drifts by centimetres.
     #[param(default = Duration::secs(30), min = 0.0, max = 600.0)]
     pub remember: Duration,
-    /// It leaves what it follows when it has not got away from one place for this long (s). 15 is time to turn around twice.
+    /// Ground that it has come as near to is not new any more (m). 0.75: a ring of sonars sees a place well from as near.
+    #[param(default = 0.75, min = 0.05, max = 5.0)]
+    pub near: f64,
+    /// It leaves what it follows when it has come to no new ground for this long (s). 6 are two metres of way among things.
+    #[param(default = 6.0, min = 0.5, max = 600.0)]
+    pub restless: f64,
+    /// It gives up a place when it has not got away from one spot for this long (s). 15 is time to turn around twice.
     #[param(default = 15.0, min = 1.0, max = 600.0)]
     pub patience: f64,
     /// How long a wish of it holds (time). 600 ms is two missed readings of a sonar at 4 Hz.
@@ -63,6 +68,8 @@ impl WallParams {
             look: self.look,
             speed: self.speed,
             growth: self.growth,
+            near: self.near,
+            restless: self.restless,
             patience: self.patience,
             ..Parameters::new(self.radius)
         }
@@ -77,6 +84,12 @@ impl WallParams {
         3.0 * self.look
     }
 }
+
+/// So far around it the robot takes over what it has heard (m): the echoes that go into its map.
+const SEEN: f64 = 2.2;
+
+/// What may be there within this is not gone nearer to (m); farther away only what was heard twice is in the way.
+const CLOSE: f64 = 0.45;
 
 /// Keeps to the wall at its side and goes the faster the freer the way is; leaves an island that it has circled.
 #[derive(Agent)]
@@ -119,11 +132,12 @@ impl Agent for WallFollower {
 #[derive(Debug, Default)]
 struct Walk {
     map: LocalMap,
+    ground: Ground,
     roamer: Option<Roamer>,
     pose: Option<Pose>,
     heard: Option<Time>,
     beside: Beside,
-    last: Option<(Pose, Time)>,
+    last: Option<Time>,
 }
 
 impl Walk {
@@ -132,9 +146,14 @@ impl Walk {
         if self.pose.is_none() {
             // Without odometry what was heard before may be anywhere.
             self.map.reset();
+            self.ground.forget();
         }
+        let here = at.or(self.pose).unwrap_or_default();
         self.map.set_params(params.map());
-        self.map.update(echoes(ranges), at.or(self.pose).unwrap_or_default(), stamp);
+        self.map.update(echoes(ranges), here, stamp);
+        for (middle, taken) in self.map.squares(here.position(), SEEN) {
+            self.ground.see(middle, taken.map(|taken| if taken { Seen::Taken } else { Seen::Free }));
+        }
         self.heard = Some(stamp);
         self.beside = beside(params, ranges);
     }
@@ -143,13 +162,14 @@ impl Walk {
     fn advance(&mut self, params: &WallParams, now: Time) -> Option<Offer> {
         let heard = self.heard.filter(|heard| now - *heard <= params.hold)?;
         let here = self.pose.unwrap_or_default();
-        let (before, then) = self.last.replace((here, now)).unwrap_or((here, now));
+        let before = self.last.replace(now).unwrap_or(now);
         let law = params.law();
-        let roamer = self.roamer.get_or_insert_with(|| Roamer::new(law));
+        let roamer = self.roamer.get_or_insert_with(|| Roamer::new(law, here));
         roamer.set_parameters(law);
         let left = roamer.times_left();
-        let points = self.map.around(here, params.reach(), now);
-        let twist = roamer.step(points, self.beside, moved(before, here), (now - then).seconds());
+        let points =
+            self.map.around(here, params.reach(), now, 2).chain(self.map.around(here, CLOSE, now, 1));
+        let twist = roamer.step(points, self.beside, here, &mut self.ground, (now - before).seconds());
         if roamer.times_left() > left {
             runtime::note!("leaves what it followed; times so far: {}", roamer.times_left());
         }
@@ -167,30 +187,10 @@ fn beside(params: &WallParams, ranges: &Ranges) -> Beside {
     Beside { left: on(1.0), right: on(-1.0) }
 }
 
-/// The motion between two poses, as if along an arc.
-fn moved(before: Pose, now: Pose) -> Increment {
-    let there = before.inverse().transform(now.position());
-    let turn = wrap(now.heading - before.heading);
-    let half = turn / 2.0;
-    let longer = if half.abs() > 1e-6 { half / sin(half) } else { 1.0 };
-    // Across the half turned heading the motion has no part, so its sign is that of the part along it.
-    let along = there.x * libm::cos(half) + there.y * sin(half);
-    Increment { distance: along * longer, turn }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::shared::blank;
-
-    #[test]
-    fn the_motion_between_two_poses_is_the_arc_between_them() {
-        let start = Pose::new(1.0, -2.0, 2.9);
-        for (distance, turn) in [(0.1, 0.5), (-0.1, 0.3), (0.2, -0.4), (0.15, 0.0), (0.0, 1.0)] {
-            let got = moved(start, start.along_arc(distance, turn));
-            assert!((got.distance - distance).abs() < 1e-9 && (got.turn - turn).abs() < 1e-9, "{got:?}");
-        }
-    }
 
     #[test]
     fn before_a_wall_it_turns_so_that_the_wall_is_on_the_chosen_side() {

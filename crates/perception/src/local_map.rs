@@ -34,6 +34,13 @@ const INSIDE: f64 = 0.9;
 /// Within this of a sensor its cone is narrow, and what it tells counts double (m).
 const NEARBY: f64 = 0.8;
 
+/// The parts of a cone of which each is in the shadow of a face or not.
+const SHADES: usize = 41;
+/// So far around a cell its face is looked at (cells).
+const FACE: i32 = 3;
+/// A smooth face that is met farther than this off its normal is silent (rad): 20°, of the 15 to 25° that are measured.
+const OBLIQUE: f64 = 0.4;
+
 /// What is known of the sensors, and how long to remember.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct MapParams {
@@ -117,8 +124,15 @@ impl LocalMap {
         self.clear_body(pose);
     }
 
-    /// The middles of the occupied cells within `reach` (m) of the robot, in its frame; `reach` is at most half of the map's width.
-    pub fn around(&self, pose: Pose, reach: f64, now: Time) -> impl Iterator<Item = Point> + Clone + '_ {
+    /// The middles of the occupied cells within `reach` (m) of the robot, in its frame; `reach` is at most half of the map's width. Cells with
+    /// less evidence than `least` are left out: 1 for those that may be occupied, 2 for those that were heard twice, or from nearby.
+    pub fn around(
+        &self,
+        pose: Pose,
+        reach: f64,
+        now: Time,
+        least: i8,
+    ) -> impl Iterator<Item = Point> + Clone + '_ {
         let reach = reach.clamp(0.0, f64::from(SIDE / 2 - 1) * CELL);
         let ((x, y), span) = (index(pose.position()), floor(reach / CELL) as i32);
         let oldest = ticks(now).saturating_sub(ticks(Time::ZERO + self.params.keep));
@@ -127,13 +141,42 @@ impl LocalMap {
             .flat_map(move |iy| (x - span..=x + span).map(move |ix| (ix, iy)))
             .filter(move |&(ix, iy)| {
                 let cell = self.cells[slot(ix, iy)];
-                cell.evidence > 0 && cell.heard >= oldest && cell.tile == tile(ix, iy)
+                cell.evidence >= least && cell.heard >= oldest && cell.tile == tile(ix, iy)
             })
             .map(move |(ix, iy)| {
                 let off = middle(ix, iy) - pose.position();
                 Point::new(c * off.x + s * off.y, c * off.y - s * off.x)
             })
             .filter(move |point| point.norm() <= reach)
+    }
+
+    /// What is known within `reach` (m) of a place on squares of two cells by two: the middle of each, and whether something is surely in it, or
+    /// surely nothing. Squares of which nothing was ever known are left out.
+    pub fn squares(&self, place: Point, reach: f64) -> impl Iterator<Item = (Point, Option<bool>)> + '_ {
+        let reach = reach.clamp(0.0, f64::from(SIDE / 2 - 2) * CELL);
+        let half = |i: i32| i.div_euclid(2);
+        let ((x, y), span) = (index(place), floor(reach / (2.0 * CELL)) as i32);
+        (half(y) - span..=half(y) + span)
+            .flat_map(move |iy| (half(x) - span..=half(x) + span).map(move |ix| (2 * ix, 2 * iy)))
+            .filter_map(move |(ix, iy)| {
+                let four = [(0, 0), (1, 0), (0, 1), (1, 1)].map(|(dx, dy)| (ix + dx, iy + dy));
+                let known = four.into_iter().filter_map(|(x, y)| {
+                    let cell = &self.cells[slot(x, y)];
+                    (cell.tile == tile(x, y) && cell.evidence != 0).then_some(cell.evidence)
+                });
+                let most = known.max()?;
+                let middle = Point::new(f64::from(ix + 1) * CELL, f64::from(iy + 1) * CELL);
+                Some((
+                    middle,
+                    if most >= SURE {
+                        Some(true)
+                    } else if most < 0 {
+                        Some(false)
+                    } else {
+                        None
+                    },
+                ))
+            })
     }
 
     /// Less evidence for what is nearer than an echo at `range` (m) from the sensor.
@@ -143,16 +186,63 @@ impl LocalMap {
         if range <= self.params.shortest + self.params.behind {
             return;
         }
+        let widest = INSIDE * self.params.cone;
+        let mut shadow = [false; SHADES];
+        let shade = |across: f64| ((across / widest + 1.0) * 0.5 * (SHADES - 1) as f64) as usize;
         let mut away = CELL / 2.0;
         while away < free {
-            let steps = floor(INSIDE * self.params.cone * away / CELL) as i32;
+            let steps = floor(widest * away / CELL) as i32;
             let loss = if away < NEARBY { 2 } else { 1 };
             for step in -steps..=steps {
-                let cell = self.cell(sensor.point(away, f64::from(step) * CELL));
+                let off = f64::from(step) * CELL;
+                if shadow[shade(off / away).min(SHADES - 1)] {
+                    continue;
+                }
+                let point = sensor.point(away, off);
+                if self.cell(point).evidence >= SURE && self.is_met_obliquely(point, sensor) {
+                    let (from, to) = (shade((off - CELL / 2.0) / away), shade((off + CELL / 2.0) / away));
+                    shadow[from.min(SHADES - 1)..=to.min(SHADES - 1)].fill(true);
+                    continue;
+                }
+                let cell = self.cell(point);
                 cell.evidence = (cell.evidence - loss).max(EVIDENCE.0);
             }
             away += CELL;
         }
+    }
+
+    /// Whether a point lies on a face that a sensor meets so obliquely that it is silent: then an echo from behind it says nothing against it.
+    fn is_met_obliquely(&self, point: Point, sensor: Sensor) -> bool {
+        let (x, y) = index(point);
+        let (mut n, mut sum, mut xx, mut xy, mut yy) = (0.0, Point::default(), 0.0, 0.0, 0.0);
+        for dy in -FACE..=FACE {
+            for dx in -FACE..=FACE {
+                let cell = &self.cells[slot(x + dx, y + dy)];
+                if cell.evidence >= SURE && cell.tile == tile(x + dx, y + dy) {
+                    let at = Point::new(f64::from(dx), f64::from(dy));
+                    n += 1.0;
+                    sum = sum + at;
+                    (xx, xy, yy) = (xx + at.x * at.x, xy + at.x * at.y, yy + at.y * at.y);
+                }
+            }
+        }
+        if n < 4.0 {
+            return false;
+        }
+        let (xx, xy, yy) = (
+            xx / n - sum.x * sum.x / (n * n),
+            xy / n - sum.x * sum.y / (n * n),
+            yy / n - sum.y * sum.y / (n * n),
+        );
+        // The eigenvalues of the covariance: the face is long in one direction and thin in the other.
+        let (mean, off) = ((xx + yy) / 2.0, libm::sqrt((xx - yy) * (xx - yy) / 4.0 + xy * xy));
+        if mean - off > 0.25 * (mean + off) {
+            return false;
+        }
+        let along = Point::polar(1.0, 0.5 * libm::atan2(2.0 * xy, xx - yy));
+        let ray = point - sensor.origin;
+        // Sine of the angle between ray and face is the cosine of that to its normal.
+        libm::fabs(ray.cross(along)) < cos(OBLIQUE) * ray.norm()
     }
 
     /// More evidence for that from which an echo at `range` (m) from the sensor came.
@@ -299,7 +389,7 @@ mod tests {
 
     fn nearest(map: &LocalMap, pose: Pose, now: f64) -> Point {
         let far = Point::new(f64::INFINITY, 0.0);
-        map.around(pose, 2.0, at(now)).fold(far, |best, p| if p.norm() < best.norm() { p } else { best })
+        map.around(pose, 2.0, at(now), 1).fold(far, |best, p| if p.norm() < best.norm() { p } else { best })
     }
 
     fn hear(map: &mut LocalMap, echoes: &[(f64, f64)], pose: Pose, now: f64) {
@@ -330,6 +420,46 @@ mod tests {
         assert!(nearest(&map, Pose::default(), 0.4).y.abs() > 0.1);
     }
 
+    /// A wall half a metre to the left, heard while the robot goes along it.
+    fn along_a_wall() -> LocalMap {
+        let mut map = LocalMap::default();
+        for i in 0..40 {
+            let pose = Pose::new(0.05 * f64::from(i), 0.0, 0.0);
+            hear(&mut map, &[(PI / 2.0, 0.5)], pose, 0.2 * f64::from(i));
+        }
+        map
+    }
+
+    #[test]
+    fn an_echo_from_behind_a_face_that_is_met_obliquely_says_nothing_against_it() {
+        let wall = Point::new(1.525, 0.475);
+        let is_there =
+            |map: &LocalMap| map.around(Pose::default(), 2.0, at(9.0), 1).any(|p| p.distance(wall) < 0.03);
+        let mut map = along_a_wall();
+        assert!(is_there(&map));
+        // 45° off the normal, through the wall.
+        for _ in 0..10 {
+            hear(&mut map, &[(PI / 4.0, 2.2)], Pose::new(1.0, 0.0, 0.0), 8.0);
+        }
+        assert!(is_there(&map));
+        // Straight through it: the wall is gone.
+        for _ in 0..10 {
+            hear(&mut map, &[(PI / 2.0, 1.5)], Pose::new(1.525, -0.02, 0.0), 8.5);
+        }
+        assert!(!is_there(&map));
+    }
+
+    #[test]
+    fn squares_tell_what_is_surely_taken_and_surely_free() {
+        let map = along_a_wall();
+        let squares: Vec<_> = map.squares(Point::new(1.0, 0.0), 1.0).collect();
+        let of = |x: f64, y: f64| {
+            let found = squares.iter().find(|(p, _)| (p.x - x).abs() < 0.051 && (p.y - y).abs() < 0.051);
+            found.and_then(|(_, taken)| *taken)
+        };
+        assert_eq!((of(1.0, 0.5), of(1.0, 0.3), of(1.0, -0.5)), (Some(true), Some(false), None));
+    }
+
     #[test]
     fn the_shortest_echo_says_nothing_against_what_is_nearer() {
         let mut map = LocalMap::default();
@@ -358,7 +488,7 @@ mod tests {
             map.update(echoes, pose, at(0.2 * f64::from(i)));
         }
         let end = Pose::new(2.0, 0.0, 0.0);
-        let places: Vec<Point> = map.around(end, 2.0, at(8.0)).map(|p| end.transform(p)).collect();
+        let places: Vec<Point> = map.around(end, 2.0, at(8.0), 1).map(|p| end.transform(p)).collect();
         assert!(places.iter().any(|p| p.distance(post) < 0.08), "{places:?}");
         assert!(places.iter().all(|p| p.distance(post) < 0.3), "{places:?}");
     }

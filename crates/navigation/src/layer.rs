@@ -1,0 +1,170 @@
+//! A bit for each cell of a square grid on a torus, and what morphology needs of it, a word of 64 cells at a time.
+
+use libm::{floor, sqrt};
+
+/// Cells on a side: with cells of 10 cm that is a floor of 25.6 m, with several rooms.
+pub(crate) const SIDE: usize = 256;
+const WORDS: usize = SIDE / 64;
+
+/// A row of bits, on a ring.
+type Row = [u64; WORDS];
+
+/// A bit for each cell; a cell is its row times [`SIDE`] plus its column.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub(crate) struct Layer(Box<[Row]>);
+
+impl Default for Layer {
+    fn default() -> Layer {
+        Layer(vec![[0; WORDS]; SIDE].into_boxed_slice())
+    }
+}
+
+impl Layer {
+    pub(crate) fn get(&self, cell: usize) -> bool {
+        let (row, column) = (cell / SIDE, cell % SIDE);
+        self.0[row][column / 64] >> (column % 64) & 1 == 1
+    }
+
+    pub(crate) fn set(&mut self, cell: usize, to: bool) {
+        let (row, column) = (cell / SIDE, cell % SIDE);
+        let bit = 1 << (column % 64);
+        let word = &mut self.0[row][column / 64];
+        *word = if to { *word | bit } else { *word & !bit };
+    }
+
+    pub(crate) fn is_empty(&self) -> bool {
+        self.0.iter().all(|row| row.iter().all(|word| *word == 0))
+    }
+
+    pub(crate) fn clear(&mut self) {
+        self.0.fill([0; WORDS]);
+    }
+
+    pub(crate) fn clear_row(&mut self, row: usize) {
+        self.0[row] = [0; WORDS];
+    }
+
+    pub(crate) fn clear_column(&mut self, column: usize) {
+        for row in &mut self.0 {
+            row[column / 64] &= !(1 << (column % 64));
+        }
+    }
+
+    /// How many cells of the square of `2 reach + 1` cells around one are in it.
+    pub(crate) fn count(&self, cell: usize, reach: usize) -> u32 {
+        let (row, column) = (cell / SIDE, cell % SIDE);
+        let mask = (1u64 << (2 * reach + 1)) - 1;
+        (row + SIDE - reach..=row + SIDE + reach)
+            .map(|y| (turned(&self.0[y % SIDE], SIDE + reach - column)[0] & mask).count_ones())
+            .sum()
+    }
+
+    /// Into `self` what is in one or the other.
+    pub(crate) fn unite(&mut self, one: &Layer, other: &Layer) {
+        for ((out, one), other) in self.0.iter_mut().zip(&one.0).zip(&other.0) {
+            *out = either(*one, *other);
+        }
+    }
+
+    /// Into `self` what is in `one` and not in `other`.
+    pub(crate) fn difference(&mut self, one: &Layer, other: &Layer) {
+        for ((out, one), other) in self.0.iter_mut().zip(&one.0).zip(&other.0) {
+            *out = std::array::from_fn(|i| one[i] & !other[i]);
+        }
+    }
+
+    /// Into `self` all cells within `radius` (cells) of one that is in `from`.
+    pub(crate) fn dilate(&mut self, from: &Layer, radius: f64) {
+        self.clear();
+        let reach = floor(radius.max(0.0)) as usize;
+        for (y, row) in from.0.iter().enumerate() {
+            if row.iter().all(|word| *word == 0) {
+                continue;
+            }
+            // From the top of the disc to its middle it grows wider.
+            let (mut wide, mut width) = (*row, 0);
+            for dy in (0..=reach).rev() {
+                let half = floor(sqrt(radius * radius - (dy * dy) as f64)) as usize;
+                while width < half {
+                    width += 1;
+                    wide = either(wide, either(turned(row, width), turned(row, SIDE - width)));
+                }
+                for y in [y + dy, y + SIDE - dy] {
+                    let out = &mut self.0[y % SIDE];
+                    *out = either(*out, wide);
+                }
+            }
+        }
+    }
+}
+
+fn either(a: Row, b: Row) -> Row {
+    std::array::from_fn(|i| a[i] | b[i])
+}
+
+/// A row turned by so many columns, upwards.
+fn turned(row: &Row, by: usize) -> Row {
+    let (words, bits) = (by / 64, by % 64);
+    std::array::from_fn(|i| {
+        let high = row[(i + 2 * WORDS - words) % WORDS] << bits;
+        let low = row[(i + 2 * WORDS - words - 1) % WORDS];
+        // The lowest bits of a word come from the one before it.
+        high | (low >> 1) >> (63 - bits)
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    fn layer(cells: &[usize]) -> Layer {
+        let mut layer = Layer::default();
+        for cell in cells {
+            layer.set(*cell, true);
+        }
+        layer
+    }
+
+    /// How far two cells are apart on the torus, in columns and rows.
+    fn apart(a: usize, b: usize) -> (usize, usize) {
+        let ring = |a: usize, b: usize| a.abs_diff(b).min(SIDE - a.abs_diff(b));
+        (ring(a % SIDE, b % SIDE), ring(a / SIDE, b / SIDE))
+    }
+
+    proptest! {
+        #![proptest_config(ProptestConfig::with_cases(24))]
+
+        #[test]
+        fn a_dilated_layer_has_the_cells_within_the_radius_and_no_others(
+            cells in proptest::collection::vec(0..SIDE * SIDE, 0..12), radius in 0.0..5.0f64,
+        ) {
+            let mut wide = Layer::default();
+            wide.dilate(&layer(&cells), radius);
+            for cell in 0..SIDE * SIDE {
+                let near = cells.iter().any(|c| {
+                    let (dx, dy) = apart(*c, cell);
+                    (dx * dx + dy * dy) as f64 <= radius * radius
+                });
+                prop_assert_eq!(wide.get(cell), near, "cell {}", cell);
+            }
+        }
+    }
+
+    #[test]
+    fn rows_and_columns_are_cleared_and_differences_taken() {
+        let full = layer(&(0..SIDE * SIDE).collect::<Vec<_>>());
+        let mut some = full.clone();
+        some.clear_row(3);
+        some.clear_column(70);
+        let left = (0..SIDE * SIDE).filter(|c| some.get(*c)).count();
+        assert_eq!(left, (SIDE - 1) * (SIDE - 1));
+        // The square around a corner of the torus lies in all four of its corners.
+        assert_eq!((full.count(0, 2), some.count(0, 2), some.count(3 * SIDE + 70, 1)), (25, 25, 4));
+        assert_eq!(some.count(2 * SIDE + 69, 2), 16);
+        let mut off = Layer::default();
+        off.difference(&full, &some);
+        assert_eq!((0..SIDE * SIDE).filter(|c| off.get(*c)).count(), 2 * SIDE - 1);
+        assert!(off.get(3 * SIDE) && off.get(70) && !off.get(71));
+    }
+}

@@ -1,0 +1,15 @@
+//! Where to go: what is known of the floor, the ways over it, and how to roam through a place that nobody knows.
+//!
+//! Values in, values out: no clock, no thread, no agent. All memory is taken when a value is made; no step allocates.
+//! Metres, radians and seconds; x forward, y left, counter-clockwise positive.
+//!
+//! | module | from | to |
+//! |---|---|---|
+//! | [`ground`] | where it is free, where something stands, where the robot has been | the way to the nearest new ground |
+//! | [`roam`] | what is around, and the ground | a motion along the walls, through every gap, to where the robot has not been |
+#![forbid(unsafe_code)]
+
+pub mod ground;
+mod layer;
+pub mod roam;
+mod search;
