@@ -8,7 +8,7 @@ use runtime::{Agent, Fault, Input, Output, Step};
 use types::geometry::{PI, wrap};
 use types::messages::{Drive, Odometry, Offer, Ranges};
 use types::params::Params;
-use types::{Duration, Pose, Text, Time};
+use types::{Duration, Point, Pose, Text, Time};
 
 use crate::shared::echoes;
 
@@ -133,6 +133,8 @@ impl Agent for WallFollower {
 struct Walk {
     map: LocalMap,
     ground: Ground,
+    /// What is around in this step; kept for its memory.
+    points: Vec<Point>,
     roamer: Option<Roamer>,
     pose: Option<Pose>,
     heard: Option<Time>,
@@ -167,8 +169,11 @@ impl Walk {
         let roamer = self.roamer.get_or_insert_with(|| Roamer::new(law, here));
         roamer.set_parameters(law);
         let left = roamer.times_left();
-        let points =
-            self.map.around(here, params.reach(), now, 2).chain(self.map.around(here, CLOSE, now, 1));
+        // The roamer looks at them several times; finding them is dear.
+        self.points.clear();
+        self.points.extend(self.map.around(here, params.reach(), now, 2));
+        self.points.extend(self.map.around(here, CLOSE, now, 1));
+        let points = self.points.iter().copied();
         let twist = roamer.step(points, self.beside, here, &mut self.ground, (now - before).seconds());
         if roamer.times_left() > left {
             runtime::note!("leaves what it followed; times so far: {}", roamer.times_left());

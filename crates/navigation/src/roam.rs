@@ -244,9 +244,9 @@ impl Roamer {
     }
 
     /// The free ways with much room, with some and with the least.
-    fn fans(&self, points: impl Iterator<Item = Point> + Clone) -> [Fan; 3] {
+    fn fans(&self, points: impl Iterator<Item = Point>) -> [Fan; 3] {
         let Parameters { keep, least, .. } = self.parameters;
-        [keep, (keep + least) / 2.0, least].map(|room| Fan::new(&self.compass, points.clone(), room))
+        Fan::of_rooms(&self.compass, points, [keep, (keep + least) / 2.0, least])
     }
 
     /// Straight on, or along what is in the way.

@@ -17,7 +17,7 @@
 //! Near echoes count more than far ones, because their arcs are short. Silence says nothing. (Free space and evidence on a grid: Moravec
 //! and Elfes 1985. One echo one cause: the "mutual exclusion" of Konolige 1997.)
 
-use libm::{cos, floor, sin};
+use libm::{cos, sin};
 use types::{Duration, Point, Pose, Time};
 
 /// Side of a cell (m). Half the reach of what two readings of one thing differ by, at 1 m.
@@ -85,7 +85,14 @@ struct Cell {
 pub struct LocalMap {
     params: MapParams,
     cells: Box<[Cell]>,
+    /// A bit for each cell, a word for each row of the memory: set where the evidence is above zero. Few cells are occupied, and
+    /// looking for them in words spares looking at all the others.
+    occupied: Box<[Row; SIDE as usize]>,
 }
+
+/// The bits of a row: as many as a map has cells on a side.
+type Row = u128;
+const _: () = assert!(Row::BITS == SIDE as u32);
 
 impl Default for LocalMap {
     fn default() -> LocalMap {
@@ -96,7 +103,11 @@ impl Default for LocalMap {
 impl LocalMap {
     /// A map that knows nothing. The memory for all of it is taken here.
     pub fn new(params: MapParams) -> LocalMap {
-        LocalMap { params, cells: vec![Cell::default(); (SIDE * SIDE) as usize].into_boxed_slice() }
+        LocalMap {
+            params,
+            cells: vec![Cell::default(); (SIDE * SIDE) as usize].into_boxed_slice(),
+            occupied: Box::new([0; SIDE as usize]),
+        }
     }
 
     /// Changes the parameters; what was heard is kept.
@@ -107,6 +118,7 @@ impl LocalMap {
     /// Forgets everything.
     pub fn reset(&mut self) {
         self.cells.fill(Cell::default());
+        self.occupied.fill(0);
     }
 
     /// Takes over a reading that was made at `pose`: bearing (rad) and distance from the robot's centre (m) of each echo. Directions
@@ -134,11 +146,11 @@ impl LocalMap {
         least: i8,
     ) -> impl Iterator<Item = Point> + Clone + '_ {
         let reach = reach.clamp(0.0, f64::from(SIDE / 2 - 1) * CELL);
-        let ((x, y), span) = (index(pose.position()), floor(reach / CELL) as i32);
+        let ((x, y), span) = (index(pose.position()), whole(reach / CELL));
         let oldest = ticks(now).saturating_sub(ticks(Time::ZERO + self.params.keep));
         let (s, c) = (sin(pose.heading), cos(pose.heading));
         (y - span..=y + span)
-            .flat_map(move |iy| (x - span..=x + span).map(move |ix| (ix, iy)))
+            .flat_map(move |iy| self.occupied_in(iy, x - span, 2 * span + 1).map(move |ix| (ix, iy)))
             .filter(move |&(ix, iy)| {
                 let cell = self.cells[slot(ix, iy)];
                 cell.evidence >= least && cell.heard >= oldest && cell.tile == tile(ix, iy)
@@ -147,7 +159,14 @@ impl LocalMap {
                 let off = middle(ix, iy) - pose.position();
                 Point::new(c * off.x + s * off.y, c * off.y - s * off.x)
             })
-            .filter(move |point| point.norm() <= reach)
+            .filter(move |point| is_within(*point, reach))
+    }
+
+    /// The columns with evidence above zero in row `iy`, of `count` (less than the side) from column `first` on.
+    fn occupied_in(&self, iy: i32, first: i32, count: i32) -> Columns {
+        let row = self.occupied[iy.rem_euclid(SIDE) as usize];
+        let wanted = (1 << count) - 1;
+        Columns { left: row.rotate_right(first.rem_euclid(SIDE) as u32) & wanted, first }
     }
 
     /// What is known within `reach` (m) of a place on squares of two cells by two: the middle of each, and whether something is surely in it, or
@@ -155,7 +174,7 @@ impl LocalMap {
     pub fn squares(&self, place: Point, reach: f64) -> impl Iterator<Item = (Point, Option<bool>)> + '_ {
         let reach = reach.clamp(0.0, f64::from(SIDE / 2 - 2) * CELL);
         let half = |i: i32| i.div_euclid(2);
-        let ((x, y), span) = (index(place), floor(reach / (2.0 * CELL)) as i32);
+        let ((x, y), span) = (index(place), whole(reach / (2.0 * CELL)));
         (half(y) - span..=half(y) + span)
             .flat_map(move |iy| (half(x) - span..=half(x) + span).map(move |ix| (2 * ix, 2 * iy)))
             .filter_map(move |(ix, iy)| {
@@ -191,7 +210,7 @@ impl LocalMap {
         let shade = |across: f64| ((across / widest + 1.0) * 0.5 * (SHADES - 1) as f64) as usize;
         let mut away = CELL / 2.0;
         while away < free {
-            let steps = floor(widest * away / CELL) as i32;
+            let steps = whole(widest * away / CELL);
             let loss = if away < NEARBY { 2 } else { 1 };
             for step in -steps..=steps {
                 let off = f64::from(step) * CELL;
@@ -199,13 +218,13 @@ impl LocalMap {
                     continue;
                 }
                 let point = sensor.point(away, off);
-                if self.cell(point).evidence >= SURE && self.is_met_obliquely(point, sensor) {
+                let at = self.slot_of(point);
+                if self.cells[at].evidence >= SURE && self.is_met_obliquely(point, sensor) {
                     let (from, to) = (shade((off - CELL / 2.0) / away), shade((off + CELL / 2.0) / away));
                     shadow[from.min(SHADES - 1)..=to.min(SHADES - 1)].fill(true);
                     continue;
                 }
-                let cell = self.cell(point);
-                cell.evidence = (cell.evidence - loss).max(EVIDENCE.0);
+                self.set_evidence(at, (self.cells[at].evidence - loss).max(EVIDENCE.0));
             }
             away += CELL;
         }
@@ -267,9 +286,9 @@ impl LocalMap {
             1
         };
         for angle in arc {
-            let cell = self.cell(sensor.turned(range, angle));
-            cell.evidence = (cell.evidence + gain).min(EVIDENCE.1);
-            cell.heard = tick;
+            let at = self.slot_of(sensor.turned(range, angle));
+            self.set_evidence(at, (self.cells[at].evidence + gain).min(EVIDENCE.1));
+            self.cells[at].heard = tick;
         }
     }
 
@@ -279,7 +298,8 @@ impl LocalMap {
         for angle in arc {
             let mut away = between.0;
             while away <= between.1 {
-                surest = surest.max(self.cell(sensor.turned(away, angle)).evidence);
+                let at = self.slot_of(sensor.turned(away, angle));
+                surest = surest.max(self.cells[at].evidence);
                 away += CELL;
             }
         }
@@ -298,10 +318,11 @@ impl LocalMap {
         for angle in arc {
             let mut away = between.0;
             while away <= between.1 {
-                let cell = self.cell(sensor.turned(away, angle));
-                if cell.evidence >= least {
-                    cell.heard = tick;
-                    cell.evidence = (cell.evidence + 1).min(EVIDENCE.1);
+                let at = self.slot_of(sensor.turned(away, angle));
+                let evidence = self.cells[at].evidence;
+                if evidence >= least {
+                    self.cells[at].heard = tick;
+                    self.set_evidence(at, (evidence + 1).min(EVIDENCE.1));
                 }
                 away += CELL;
             }
@@ -311,25 +332,58 @@ impl LocalMap {
     /// Where the body is nothing else can be.
     fn clear_body(&mut self, pose: Pose) {
         let inner = self.params.rim - CELL;
-        let ((x, y), span) = (index(pose.position()), floor(inner / CELL) as i32);
+        let ((x, y), span) = (index(pose.position()), whole(inner / CELL));
         for iy in y - span..=y + span {
             for ix in x - span..=x + span {
                 let middle = middle(ix, iy);
-                if middle.distance(pose.position()) <= inner {
-                    self.cell(middle).evidence = EVIDENCE.0;
+                if is_within(middle - pose.position(), inner) {
+                    let at = self.slot_of(middle);
+                    self.set_evidence(at, EVIDENCE.0);
                 }
             }
         }
     }
 
-    /// The cell of a point, emptied first if its memory still speaks of another place.
-    fn cell(&mut self, point: Point) -> &mut Cell {
+    /// The place in the memory of the cell of a point, emptied first if it still speaks of another place.
+    #[inline]
+    fn slot_of(&mut self, point: Point) -> usize {
         let (ix, iy) = index(point);
-        let cell = &mut self.cells[slot(ix, iy)];
-        if cell.tile != tile(ix, iy) {
-            *cell = Cell { tile: tile(ix, iy), ..Cell::default() };
+        let at = slot(ix, iy);
+        if self.cells[at].tile != tile(ix, iy) {
+            self.set_evidence(at, 0);
+            self.cells[at] = Cell { tile: tile(ix, iy), ..Cell::default() };
         }
-        cell
+        at
+    }
+
+    #[inline]
+    fn set_evidence(&mut self, at: usize, evidence: i8) {
+        let was = core::mem::replace(&mut self.cells[at].evidence, evidence);
+        // The bit changes far less often than the evidence.
+        if (was > 0) != (evidence > 0) {
+            self.occupied[at / SIDE as usize] ^= 1 << (at % SIDE as usize);
+        }
+    }
+}
+
+/// The columns of the set bits of a row, from `first` on.
+#[derive(Clone)]
+struct Columns {
+    left: Row,
+    first: i32,
+}
+
+impl Iterator for Columns {
+    type Item = i32;
+
+    #[inline]
+    fn next(&mut self) -> Option<i32> {
+        if self.left == 0 {
+            return None;
+        }
+        let column = self.first + self.left.trailing_zeros() as i32;
+        self.left &= self.left - 1;
+        Some(column)
     }
 }
 
@@ -362,8 +416,24 @@ fn ticks(time: Time) -> i32 {
     (time.seconds() * 10.0) as i32
 }
 
+#[inline]
 fn index(point: Point) -> (i32, i32) {
-    (floor(point.x / CELL) as i32, floor(point.y / CELL) as i32)
+    (whole(point.x / CELL), whole(point.y / CELL))
+}
+
+/// The greatest whole number that is not above `x`: what rounding down and a conversion give, in fewer instructions.
+#[inline]
+fn whole(x: f64) -> i32 {
+    let cut = x as i32;
+    cut.saturating_sub(i32::from(f64::from(cut) > x))
+}
+
+/// Whether the vector is at most as long as `reach` (m, not negative). The length itself is dear and seldom needed to tell that.
+#[inline]
+fn is_within(off: Point, reach: f64) -> bool {
+    let (square, most) = (off.dot(off), reach * reach);
+    let sure = 1e-12 * most;
+    if (square - most).abs() > sure { square < most } else { off.norm() <= reach }
 }
 
 fn middle(ix: i32, iy: i32) -> Point {
@@ -381,6 +451,8 @@ fn tile(ix: i32, iy: i32) -> (i8, i8) {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use proptest::collection;
+    use proptest::prelude::*;
     use types::geometry::PI;
 
     fn at(seconds: f64) -> Time {
@@ -491,6 +563,58 @@ mod tests {
         let places: Vec<Point> = map.around(end, 2.0, at(8.0), 1).map(|p| end.transform(p)).collect();
         assert!(places.iter().any(|p| p.distance(post) < 0.08), "{places:?}");
         assert!(places.iter().all(|p| p.distance(post) < 0.3), "{places:?}");
+    }
+
+    /// What [`LocalMap::around`] is to give, by looking at each cell, without the row of bits and the short ways.
+    fn around_by_hand(map: &LocalMap, pose: Pose, reach: f64, now: Time) -> Vec<Point> {
+        let ((x, y), span) = (index(pose.position()), (reach / CELL).floor() as i32);
+        let oldest = ticks(now) - ticks(Time::ZERO + map.params.keep);
+        let cells = (y - span..=y + span).flat_map(|iy| (x - span..=x + span).map(move |ix| (ix, iy)));
+        let occupied = cells.filter(|&(ix, iy)| {
+            let cell = map.cells[slot(ix, iy)];
+            cell.evidence > 0 && cell.heard >= oldest && cell.tile == tile(ix, iy)
+        });
+        let (s, c) = (sin(pose.heading), cos(pose.heading));
+        occupied
+            .map(|(ix, iy)| middle(ix, iy) - pose.position())
+            .map(|off| Point::new(c * off.x + s * off.y, c * off.y - s * off.x))
+            .filter(|point| point.norm() <= reach)
+            .collect()
+    }
+
+    proptest! {
+        #[test]
+        fn looking_at_occupied_cells_alone_finds_what_looking_at_all_finds(
+            turn in -0.5f64..0.5, speed in -1f64..1.0, reach in 0f64..4.0,
+            readings in collection::vec(collection::vec(0.2f64..3.0, 12), 1..20)
+        ) {
+            let mut map = LocalMap::default();
+            let mut pose = Pose::new(-2.0, 3.0, 1.0);
+            for (i, reading) in readings.iter().enumerate() {
+                // Some go out of the map and come in again at the other side.
+                pose = pose.along_arc(speed, turn);
+                let echoes = reading.iter().enumerate().map(|(k, range)| (k as f64 * PI / 6.0, *range));
+                map.update(echoes, pose, at(2.0 * i as f64));
+            }
+            let now = at(40.0);
+            let reach = reach.min(3.15);
+            let found: Vec<Point> = map.around(pose, reach, now).collect();
+            prop_assert_eq!(found, around_by_hand(&map, pose, reach, now));
+        }
+
+        #[test]
+        fn the_short_way_to_round_down_is_rounding_down(x in any::<f64>(), near in -1000i32..1000) {
+            for x in [x, f64::from(near) / 7.0, f64::from(near), f64::from(near).next_down(), f64::from(near).next_up(), -0.0] {
+                prop_assert_eq!(whole(x), libm::floor(x) as i32);
+            }
+        }
+
+        #[test]
+        fn the_short_way_to_compare_a_length_is_to_compare_it(angle in -4f64..4.0, reach in 0f64..4.0, off in -4i64..4) {
+            // As near to the reach as numbers can be.
+            let point = Point::polar(f64::from_bits((reach.to_bits() as i64 + off).max(0) as u64), angle);
+            prop_assert_eq!(is_within(point, reach), point.norm() <= reach);
+        }
     }
 
     #[test]
