@@ -3,7 +3,7 @@
 //! It runs when ranges come, and once more when they stay away: then it is blind, and says so.
 
 use motion::ring::Ring;
-use motion::safety::{Parameters, Verdict, judge};
+use motion::safety::{Parameters, Verdict, judge, judge_one};
 use perception::local_map::{LocalMap, MapParams};
 use runtime::{Agent, Fault, Input, Output, Step};
 use types::geometry::{PI, wrap};
@@ -223,7 +223,7 @@ impl Watch {
             len += 1;
         }
         let points = Ring::Beams(&room[..len]);
-        (len > 0).then(|| judge(&params.law(), points, points, self.motion))
+        (len > 0).then(|| judge_one(&params.law(), points, self.motion))
     }
 
     /// With something beside it as near as can be told it creeps; with that in front it may be nearer than told, and it stands.

@@ -10,6 +10,7 @@
 //! What is in the way is a set of points in the frame of the robot, of a map or of a scan; the wall is on the left. For a wall on the
 //! right mirror the points and the answer.
 
+use core::ops::Range;
 use libm::{cos, fabs, fmax, fmin, sin, sqrt};
 use types::Point;
 use types::geometry::{PI, TAU, wrap};
@@ -19,15 +20,34 @@ pub const DIRECTIONS: usize = 72;
 
 /// The unit vectors of all directions, counter-clockwise from straight ahead; made once.
 #[derive(Clone, Copy, Debug)]
-pub struct Compass([Point; DIRECTIONS]);
+pub struct Compass {
+    /// Their coordinates in rows of their own, so that several directions are compared at a time.
+    x: [f64; DIRECTIONS],
+    y: [f64; DIRECTIONS],
+}
 
 impl Default for Compass {
     fn default() -> Compass {
-        let mut rose = [Point::default(); DIRECTIONS];
-        for (i, out) in rose.iter_mut().enumerate() {
-            *out = Point::new(cos(bearing(i)), sin(bearing(i)));
-        }
-        Compass(rose)
+        Compass { x: core::array::from_fn(|i| cos(bearing(i))), y: core::array::from_fn(|i| sin(bearing(i))) }
+    }
+}
+
+impl Compass {
+    #[inline]
+    fn at(&self, direction: usize) -> Point {
+        Point::new(self.x[direction], self.y[direction])
+    }
+
+    /// Whether a point lies less far ahead than `limits` in one of these directions.
+    #[inline]
+    fn is_within(&self, directions: Range<usize>, point: Point, limits: &[f64; DIRECTIONS]) -> bool {
+        let (x, y) = (&self.x[directions.clone()], &self.y[directions.clone()]);
+        let limits = &limits[directions];
+        // No way out at the first one: that would keep it from being done for several at a time.
+        x.iter()
+            .zip(y)
+            .zip(limits)
+            .fold(false, |any, ((x, y), limit)| any | (point.x * x + point.y * y < *limit))
     }
 }
 
@@ -79,7 +99,7 @@ impl Fan {
     ///
     /// A point at distance ρ, off the direction by δ, stops the body after ρ cos δ − √(room² − ρ² sin² δ). With a point nearer than
     /// `room` already it may go where it comes no nearer: then its distance counts in place of the room.
-    pub fn new(compass: &Compass, points: impl Iterator<Item = Point>, room: f64) -> Fan {
+    pub fn new(compass: &Compass, points: impl Iterator<Item = Point> + Clone, room: f64) -> Fan {
         let [fan] = Fan::of_rooms(compass, points, [room]);
         fan
     }
@@ -87,47 +107,22 @@ impl Fan {
     /// The fans for several rooms (m), at little more than the price of the largest.
     pub fn of_rooms<const N: usize>(
         compass: &Compass,
-        points: impl Iterator<Item = Point>,
+        points: impl Iterator<Item = Point> + Clone,
         rooms: [f64; N],
     ) -> [Fan; N] {
-        let mut fans =
-            [const { Fan { ways: [f64::INFINITY; DIRECTIONS], stops: [Point::new(0.0, 0.0); DIRECTIONS] } };
-                N];
-        for point in points {
-            let distance = point.norm();
-            let rooms = rooms.map(|room| fmin(room, distance - NO_NEARER));
-            let widest = rooms.iter().copied().fold(0.0, fmax);
-            if widest <= 0.0 {
-                continue;
-            }
-            let span = span(widest / distance);
-            let first = (roughly(point) + DIRECTIONS - span) % DIRECTIONS;
-            for step in 0..=2 * span {
-                let i = if first + step < DIRECTIONS { first + step } else { first + step - DIRECTIONS };
-                let along = point.dot(compass.0[i]);
-                if along <= 0.0 {
-                    continue;
-                }
-                let across = point.cross(compass.0[i]);
-                for (fan, room) in fans.iter_mut().zip(rooms) {
-                    fan.offer(i, point, along, across, room);
+        let mut drawing = Drawing::new(compass, rooms);
+        // What is near hides most of the rest, which then costs next to nothing.
+        let mut from = 0.0;
+        for to in [0.5, 1.0, f64::INFINITY] {
+            for (number, point) in points.clone().enumerate() {
+                let square = point.dot(point);
+                if from <= square && square < to * to {
+                    drawing.add(number, point, sqrt(square));
                 }
             }
+            from = to * to;
         }
-        fans
-    }
-
-    /// A point that stops a body that wants `room` in direction `i`, if it does so before what is known.
-    #[inline]
-    fn offer(&mut self, i: usize, point: Point, along: f64, across: f64, room: f64) {
-        let under = room * room - across * across;
-        // The root is at most the room: what is too far even with that needs no root.
-        if room > 0.0 && under > 0.0 && along - room < self.ways[i] {
-            let way = along - sqrt(under);
-            if way < self.ways[i] {
-                (self.ways[i], self.stops[i]) = (way, point);
-            }
-        }
+        drawing.fans
     }
 
     /// The free way in a direction (m); infinite if nothing is there.
@@ -160,6 +155,87 @@ impl Fan {
             .flat_map(|step| [wanted + DIRECTIONS - step, wanted + step])
             .map(|i| i % DIRECTIONS)
             .find(|&i| self.ways[i] >= look)
+    }
+}
+
+/// Fans in the making.
+struct Drawing<'a, const N: usize> {
+    compass: &'a Compass,
+    rooms: [f64; N],
+    /// The largest of them.
+    most: f64,
+    fans: [Fan; N],
+    /// The numbers of the points that stop the body: of two that stop it at the same place the first counts, whatever the order in
+    /// which they are looked at.
+    numbers: [[usize; DIRECTIONS]; N],
+    /// What lies as far ahead as this shortens no way of any fan.
+    limits: [f64; DIRECTIONS],
+}
+
+/// More than the error of a sum of two lengths (m).
+const HAIR: f64 = 1e-9;
+
+impl<'a, const N: usize> Drawing<'a, N> {
+    fn new(compass: &'a Compass, rooms: [f64; N]) -> Drawing<'a, N> {
+        const FREE: Fan =
+            Fan { ways: [f64::INFINITY; DIRECTIONS], stops: [Point::new(0.0, 0.0); DIRECTIONS] };
+        Drawing {
+            compass,
+            rooms,
+            most: rooms.iter().copied().fold(0.0, fmax),
+            fans: [FREE; N],
+            numbers: [[0; DIRECTIONS]; N],
+            limits: [f64::INFINITY; DIRECTIONS],
+        }
+    }
+
+    /// Takes in a point; `away` is how far it is, but for the last digit.
+    fn add(&mut self, number: usize, point: Point, away: f64) {
+        // The last digit counts only for what is nearer than wanted, and it is dear.
+        let distance = if away > self.most + 2.0 * NO_NEARER { away } else { point.norm() };
+        let rooms = self.rooms.map(|room| fmin(room, distance - NO_NEARER));
+        let widest = rooms.iter().copied().fold(0.0, fmax);
+        if widest <= 0.0 {
+            return;
+        }
+        let span = span(widest / distance);
+        let first = (roughly(point) + DIRECTIONS - span) % DIRECTIONS;
+        let last = first + 2 * span + 1;
+        // The directions lie in a circle.
+        for directions in [first..last.min(DIRECTIONS), 0..last.saturating_sub(DIRECTIONS)] {
+            if self.compass.is_within(directions.clone(), point, &self.limits) {
+                for i in directions {
+                    self.offer(i, number, point, &rooms);
+                }
+            }
+        }
+    }
+
+    /// A point that may stop the body in direction `i`.
+    fn offer(&mut self, i: usize, number: usize, point: Point, rooms: &[f64; N]) {
+        let along = point.dot(self.compass.at(i));
+        if along <= 0.0 || along >= self.limits[i] {
+            return;
+        }
+        let across = point.cross(self.compass.at(i));
+        for k in 0..N {
+            let (room, fan) = (rooms[k], &mut self.fans[k]);
+            let under = room * room - across * across;
+            // The root is at most the room: what is too far even with that needs no root.
+            if room <= 0.0 || under <= 0.0 || along - room > fan.ways[i] {
+                continue;
+            }
+            let way = along - sqrt(under);
+            if way < fan.ways[i] || (way == fan.ways[i] && number < self.numbers[k][i]) {
+                (fan.ways[i], fan.stops[i], self.numbers[k][i]) = (way, point, number);
+                self.limit(i);
+            }
+        }
+    }
+
+    fn limit(&mut self, i: usize) {
+        let farthest = self.fans.iter().zip(self.rooms).map(|(fan, room)| fan.ways[i] + fmax(room, 0.0));
+        self.limits[i] = farthest.fold(0.0, fmax) + HAIR;
     }
 }
 
@@ -240,7 +316,7 @@ mod tests {
         for &point in points {
             let room = fmin(room, point.norm() - NO_NEARER);
             for i in 0..if room > 0.0 { DIRECTIONS } else { 0 } {
-                let (along, across) = (point.dot(compass.0[i]), point.cross(compass.0[i]));
+                let (along, across) = (point.dot(compass.at(i)), point.cross(compass.at(i)));
                 let under = room * room - across * across;
                 if along > 0.0 && under > 0.0 && along - sqrt(under) < fan.ways[i] {
                     (fan.ways[i], fan.stops[i]) = (along - sqrt(under), point);

@@ -92,9 +92,25 @@ pub fn speed_to_stop_within(way: f64, reaction: f64, deceleration: f64) -> f64 {
 /// together decide whether it may move forward. `present` is how the robot moves; in a curve the corridor that it is about to sweep
 /// counts as well as the straight one, as far as it takes to stop. With no echo at all in both rings it may not move forward: it is blind.
 pub fn judge(parameters: &Parameters, raw: Ring<'_>, filtered: Ring<'_>, present: Twist) -> Verdict {
-    let blind = raw.echoes().next().is_none() && filtered.echoes().next().is_none();
     let present = if crate::kinematics::is_finite(present) { present } else { Twist::ZERO };
-    let (heard, believed) = (ahead(parameters, raw, present), ahead(parameters, filtered, present));
+    let ways = (ahead(parameters, raw, present), ahead(parameters, filtered, present));
+    verdict(parameters, (raw, filtered), ways, present)
+}
+
+/// The same for one ring that is both, at half the price.
+pub fn judge_one(parameters: &Parameters, ring: Ring<'_>, present: Twist) -> Verdict {
+    let present = if crate::kinematics::is_finite(present) { present } else { Twist::ZERO };
+    let way = ahead(parameters, ring, present);
+    verdict(parameters, (ring, ring), (way, way), present)
+}
+
+fn verdict(
+    parameters: &Parameters,
+    (raw, filtered): (Ring<'_>, Ring<'_>),
+    (heard, believed): (Ahead, Ahead),
+    present: Twist,
+) -> Verdict {
+    let blind = raw.echoes().next().is_none() && filtered.echoes().next().is_none();
     let straight = fmin(heard.straight, believed.straight);
     let curved = fmin(heard.curved, believed.curved);
     let forward = !blind && straight > parameters.stop && curved > parameters.margin;
@@ -159,9 +175,13 @@ fn worst(parameters: &Parameters, echo: Echo, bearing: f64) -> Echo {
 fn way_straight(parameters: &Parameters, echo: Echo) -> f64 {
     let echo = worst(parameters, echo, 0.0);
     let half_width = parameters.radius + parameters.side_margin;
-    let (along, across) = (echo.range * cos(echo.bearing), fabs(echo.range * sin(echo.bearing)));
     // What lies beside the middle of the body or behind it is not in the way.
-    if along <= 0.0 || across >= half_width {
+    let along = echo.range * cos(echo.bearing);
+    if along <= 0.0 {
+        return f64::INFINITY;
+    }
+    let across = fabs(echo.range * sin(echo.bearing));
+    if across >= half_width {
         return f64::INFINITY;
     }
     fmax(along - sqrt(fmax(parameters.radius * parameters.radius - across * across, 0.0)), 0.0)
@@ -293,6 +313,15 @@ mod tests {
     }
 
     proptest! {
+        #[test]
+        fn one_ring_for_both_is_judged_as_two_that_are_the_same(
+            beams in prop::collection::vec((-3.2f64..3.2, -0.1f64..3.0), 0..30), linear in -0.3f64..0.6, angular in -1f64..1.0
+        ) {
+            let (parameters, ring) = (Parameters::new(0.225, 0.1, 0.25), Ring::Beams(&beams));
+            let present = Twist { linear, angular };
+            prop_assert_eq!(judge_one(&parameters, ring, present), judge(&parameters, ring, ring, present));
+        }
+
         #[test]
         fn speed_and_stopping_distance_are_inverse(way in 0.001f64..5., t in 0f64..1., a in 0.2f64..3.) {
             let v = speed_to_stop_within(way, t, a);

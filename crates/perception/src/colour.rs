@@ -154,7 +154,7 @@ impl Converter {
         for red_green in -255i32..=255 {
             for red_blue in -255i32..=255 {
                 let exact = hue(f64::from(red_green), f64::from(red_blue));
-                table[hue_index(red_green as f32, red_blue as f32) as usize] = step_of_hue(exact);
+                table[hue_index(red_green, red_blue) as usize] = step_of_hue(exact);
             }
         }
         Converter { hue: table }
@@ -273,31 +273,31 @@ fn convert_block<const N: usize>(hue: &[u8; SIDE * SIDE], rgb: &[[u8; 3]; N], hs
 
 /// Where the table has the hue of a pixel, and the word 0 S I 0 that lacks only the hue. The bytes of `pixel` are R G B x.
 ///
-/// In single precision, which holds all these whole numbers exactly and of which every processor has vectors.
+/// In whole numbers but for the one division, which is in single precision: of both every processor has vectors.
 #[inline(always)]
 fn index_and_shade(pixel: u32) -> (u32, u32) {
-    let channel = |shift: u32| ((pixel >> shift) & 0xff) as i32 as f32;
-    let less = |a: f32, b: f32| if a < b { a } else { b };
+    let channel = |shift: u32| ((pixel >> shift) & 0xff) as i32;
     let (r, g, b) = (channel(0), channel(8), channel(16));
-    let sum = r + g + b;
-    let above_grey = sum - 3.0 * less(less(r, g), b);
-    // Black has nothing above grey; its sum must only not be 0.
-    let share = above_grey * 255.0 / if sum < 1.0 { 1.0 } else { sum };
-    // Another value of this fraction is at least 1/1530 away from a half: the addend turns halves upwards, nothing else.
-    let saturation = nearest(share + 1.0 / 4096.0);
-    (nearest(hue_index(r - g, r - b)), (saturation << 8) | (nearest(sum * (1.0 / 3.0)) << 16))
+    let (sum, least) = (r + g + b, r.min(g).min(b));
+    // 255 (sum − 3 least) / sum, rounded. Black has nothing above grey; its sum must only not be 0. Another value of this fraction is
+    // at least 1/1530 away from a half: the addend of 1/4096 turns halves upwards, nothing else.
+    let (whole, grey) = (sum as f32, least as f32);
+    let share = (whole * (255.0 + 1.0 / 4096.0) - grey * 765.0) / if whole < 1.0 { 1.0 } else { whole };
+    // 10923 / 2¹⁵ is a third and a hundred-thousandth: too little more to reach the next whole number.
+    let intensity = ((sum * 10_923 + (1 << 14)) >> 15) as u32;
+    (hue_index(r - g, r - b), (nearest(share) << 8) | (intensity << 16))
 }
 
-/// The whole number nearest to `x`, for x in 0 ..= 2²²: adding 2²³ leaves it in the low bits.
+/// The whole number nearest to `x`, for x in 0 ..= 255: adding 2²³ leaves it in the low bits.
 #[inline(always)]
 fn nearest(x: f32) -> u32 {
-    (x + 8_388_608.0).to_bits() & 0x3f_ffff
+    (x + 8_388_608.0).to_bits() & 0xff
 }
 
 /// Where the table has the hue for the two differences of two bytes.
 #[inline(always)]
-fn hue_index(red_green: f32, red_blue: f32) -> f32 {
-    red_green * SIDE as f32 + red_blue + (256 * SIDE + 256) as f32
+fn hue_index(red_green: i32, red_blue: i32) -> u32 {
+    (red_green * SIDE as i32 + red_blue + (256 * SIDE + 256) as i32) as u32
 }
 
 /// Hue from R−G and R−B, on any common scale (rad, in [0, 2π)).

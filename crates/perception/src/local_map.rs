@@ -72,10 +72,12 @@ impl Default for MapParams {
     }
 }
 
+/// Cells in a map.
+const CELLS: usize = (SIDE * SIDE) as usize;
+
 /// A cell of the floor. The map is a torus: `tile` says which of the many places that share this memory it speaks of.
 #[derive(Clone, Copy, Debug, Default)]
 struct Cell {
-    heard: i32,
     tile: (i8, i8),
     evidence: i8,
 }
@@ -84,10 +86,13 @@ struct Cell {
 #[derive(Clone, Debug)]
 pub struct LocalMap {
     params: MapParams,
-    cells: Box<[Cell]>,
+    cells: Box<[Cell; CELLS]>,
+    /// When each was heard last, in ticks; apart from the cells, since most of what is done to a cell does not need it.
+    heard: Box<[i32; CELLS]>,
     /// A bit for each cell, a word for each row of the memory: set where the evidence is above zero. Few cells are occupied, and
     /// looking for them in words spares looking at all the others.
     occupied: Box<[Row; SIDE as usize]>,
+    arcs: Arcs,
 }
 
 /// The bits of a row: as many as a map has cells on a side.
@@ -105,13 +110,18 @@ impl LocalMap {
     pub fn new(params: MapParams) -> LocalMap {
         LocalMap {
             params,
-            cells: vec![Cell::default(); (SIDE * SIDE) as usize].into_boxed_slice(),
+            cells: Box::new([Cell::default(); CELLS]),
+            heard: Box::new([0; CELLS]),
             occupied: Box::new([0; SIDE as usize]),
+            arcs: Arcs::new(ARC * params.cone),
         }
     }
 
     /// Changes the parameters; what was heard is kept.
     pub fn set_params(&mut self, params: MapParams) {
+        if params.cone != self.params.cone {
+            self.arcs = Arcs::new(ARC * params.cone);
+        }
         self.params = params;
     }
 
@@ -152,8 +162,10 @@ impl LocalMap {
         (y - span..=y + span)
             .flat_map(move |iy| self.occupied_in(iy, x - span, 2 * span + 1).map(move |ix| (ix, iy)))
             .filter(move |&(ix, iy)| {
-                let cell = self.cells[slot(ix, iy)];
-                cell.evidence >= least && cell.heard >= oldest && cell.tile == tile(ix, iy)
+                let at = slot(ix, iy);
+                self.cells[at].evidence >= least
+                    && self.heard[at] >= oldest
+                    && self.cells[at].tile == tile(ix, iy)
             })
             .map(move |(ix, iy)| {
                 let off = middle(ix, iy) - pose.position();
@@ -212,14 +224,16 @@ impl LocalMap {
         while away < free {
             let steps = whole(widest * away / CELL);
             let loss = if away < NEARBY { 2 } else { 1 };
+            let point = |step: i32| sensor.point(away, f64::from(step) * CELL);
+            let mut walk = Walk::new(sensor.point(away, 0.0), sensor.left() * CELL, steps);
             for step in -steps..=steps {
+                let (ix, iy) = walk.next().unwrap_or_else(|| index(point(step)));
                 let off = f64::from(step) * CELL;
                 if shadow[shade(off / away).min(SHADES - 1)] {
                     continue;
                 }
-                let point = sensor.point(away, off);
-                let at = self.slot_of(point);
-                if self.cells[at].evidence >= SURE && self.is_met_obliquely(point, sensor) {
+                let at = self.slot_for(ix, iy);
+                if self.cells[at].evidence >= SURE && self.is_met_obliquely(ix, iy, sensor) {
                     let (from, to) = (shade((off - CELL / 2.0) / away), shade((off + CELL / 2.0) / away));
                     shadow[from.min(SHADES - 1)..=to.min(SHADES - 1)].fill(true);
                     continue;
@@ -230,9 +244,8 @@ impl LocalMap {
         }
     }
 
-    /// Whether a point lies on a face that a sensor meets so obliquely that it is silent: then an echo from behind it says nothing against it.
-    fn is_met_obliquely(&self, point: Point, sensor: Sensor) -> bool {
-        let (x, y) = index(point);
+    /// Whether a cell lies on a face that a sensor meets so obliquely that it is silent: then an echo from behind it says nothing against it.
+    fn is_met_obliquely(&self, x: i32, y: i32, sensor: Sensor) -> bool {
         let (mut n, mut sum, mut xx, mut xy, mut yy) = (0.0, Point::default(), 0.0, 0.0, 0.0);
         for dy in -FACE..=FACE {
             for dx in -FACE..=FACE {
@@ -259,23 +272,21 @@ impl LocalMap {
             return false;
         }
         let along = Point::polar(1.0, 0.5 * libm::atan2(2.0 * xy, xx - yy));
-        let ray = point - sensor.origin;
+        let ray = middle(x, y) - sensor.origin;
         // Sine of the angle between ray and face is the cosine of that to its normal.
         libm::fabs(ray.cross(along)) < cos(OBLIQUE) * ray.norm()
     }
 
     /// More evidence for that from which an echo at `range` (m) from the sensor came.
     fn put(&mut self, sensor: Sensor, range: f64, tick: i32) {
-        let half = ARC * self.params.cone;
-        let steps = libm::ceil(half * range / (0.8 * CELL)).max(1.0) as i32;
-        let arc = (-steps..=steps).map(|step| half * f64::from(step) / f64::from(steps));
+        let steps = self.arcs.steps(range);
         // What is told as the shortest range may be as near as nothing.
         let at_shortest = range <= self.params.shortest + CELL / 2.0;
         let nearest = if at_shortest { 0.0 } else { range - CELL };
         let range_to = range + 1.01 * CELL;
-        let surest = self.surest(sensor, arc.clone(), (nearest, range_to));
+        let surest = self.surest(sensor, steps, (nearest, range_to));
         if surest >= SURE {
-            self.strengthen(sensor, arc, (nearest, range_to), (surest - 1).max(SURE), tick);
+            self.strengthen(sensor, steps, (nearest, range_to), (surest - 1).max(SURE), tick);
             return;
         }
         let gain = if range < 0.6 {
@@ -285,20 +296,21 @@ impl LocalMap {
         } else {
             1
         };
-        for angle in arc {
-            let at = self.slot_of(sensor.turned(range, angle));
+        for step in -steps..=steps {
+            let at = self.slot_of(sensor.turned(range, self.arcs.way(step, steps)));
             self.set_evidence(at, (self.cells[at].evidence + gain).min(EVIDENCE.1));
-            self.cells[at].heard = tick;
+            self.heard[at] = tick;
         }
     }
 
     /// The greatest evidence between two ranges on an arc.
-    fn surest(&mut self, sensor: Sensor, arc: impl Iterator<Item = f64>, between: (f64, f64)) -> i8 {
+    fn surest(&mut self, sensor: Sensor, steps: i32, between: (f64, f64)) -> i8 {
         let mut surest = EVIDENCE.0;
-        for angle in arc {
+        for step in -steps..=steps {
+            let way = self.arcs.way(step, steps);
             let mut away = between.0;
             while away <= between.1 {
-                let at = self.slot_of(sensor.turned(away, angle));
+                let at = self.slot_of(sensor.turned(away, way));
                 surest = surest.max(self.cells[at].evidence);
                 away += CELL;
             }
@@ -307,21 +319,15 @@ impl LocalMap {
     }
 
     /// More evidence for those cells between two ranges on an arc that have this much already.
-    fn strengthen(
-        &mut self,
-        sensor: Sensor,
-        arc: impl Iterator<Item = f64>,
-        between: (f64, f64),
-        least: i8,
-        tick: i32,
-    ) {
-        for angle in arc {
+    fn strengthen(&mut self, sensor: Sensor, steps: i32, between: (f64, f64), least: i8, tick: i32) {
+        for step in -steps..=steps {
+            let way = self.arcs.way(step, steps);
             let mut away = between.0;
             while away <= between.1 {
-                let at = self.slot_of(sensor.turned(away, angle));
+                let at = self.slot_of(sensor.turned(away, way));
                 let evidence = self.cells[at].evidence;
                 if evidence >= least {
-                    self.cells[at].heard = tick;
+                    self.heard[at] = tick;
                     self.set_evidence(at, (evidence + 1).min(EVIDENCE.1));
                 }
                 away += CELL;
@@ -348,10 +354,17 @@ impl LocalMap {
     #[inline]
     fn slot_of(&mut self, point: Point) -> usize {
         let (ix, iy) = index(point);
+        self.slot_for(ix, iy)
+    }
+
+    /// The same for the numbers of the cell.
+    #[inline]
+    fn slot_for(&mut self, ix: i32, iy: i32) -> usize {
         let at = slot(ix, iy);
         if self.cells[at].tile != tile(ix, iy) {
             self.set_evidence(at, 0);
-            self.cells[at] = Cell { tile: tile(ix, iy), ..Cell::default() };
+            self.cells[at].tile = tile(ix, iy);
+            self.heard[at] = 0;
         }
         at
     }
@@ -387,6 +400,45 @@ impl Iterator for Columns {
     }
 }
 
+/// The directions in which an echo is put, relative to the axis of the sensor: in equal steps over the arc, so that cells are not
+/// left out. They depend on the number of steps alone and are computed once; those of far echoes are not kept.
+#[derive(Clone, Debug)]
+struct Arcs {
+    /// Half of the arc (rad).
+    half: f64,
+    /// For 1, 2, 3 … steps to either side, one arc after another.
+    ways: Vec<Point>,
+}
+
+impl Arcs {
+    /// So many steps to either side are kept: up to 4.8 m with the usual cone.
+    const KEPT: i32 = 30;
+
+    fn new(half: f64) -> Arcs {
+        let arcs = (1..=Arcs::KEPT).flat_map(|steps| (-steps..=steps).map(move |step| (step, steps)));
+        Arcs { half, ways: arcs.map(|(step, steps)| Arcs::compute(half, step, steps)).collect() }
+    }
+
+    /// How many steps to either side there are at `range` (m).
+    fn steps(&self, range: f64) -> i32 {
+        libm::ceil(self.half * range / (0.8 * CELL)).max(1.0) as i32
+    }
+
+    /// The direction of a step of so many to either side.
+    #[inline]
+    fn way(&self, step: i32, steps: i32) -> Point {
+        if steps > Arcs::KEPT {
+            return Arcs::compute(self.half, step, steps);
+        }
+        // Before the arc with n steps lie those with fewer: 3 + 5 + … + (2n − 1) = n² − 1 directions.
+        self.ways[(steps * steps - 1 + steps + step) as usize]
+    }
+
+    fn compute(half: f64, step: i32, steps: i32) -> Point {
+        Point::polar(1.0, half * f64::from(step) / f64::from(steps))
+    }
+}
+
 /// A sensor on the rim in the frame of the map.
 #[derive(Clone, Copy)]
 struct Sensor {
@@ -400,14 +452,61 @@ impl Sensor {
         Sensor { origin: pose.position() + axis * params.rim, axis }
     }
 
-    /// The point `along` its axis and `across` it to the left (m).
-    fn point(self, along: f64, across: f64) -> Point {
-        self.origin + self.axis * along + Point::new(-self.axis.y, self.axis.x) * across
+    /// The direction to the left of its axis.
+    fn left(self) -> Point {
+        Point::new(-self.axis.y, self.axis.x)
     }
 
-    /// The point at `range` (m), `angle` (rad) to the left of its axis.
-    fn turned(self, range: f64, angle: f64) -> Point {
-        self.point(range * cos(angle), range * sin(angle))
+    /// The point `along` its axis and `across` it to the left (m).
+    fn point(self, along: f64, across: f64) -> Point {
+        self.origin + self.axis * along + self.left() * across
+    }
+
+    /// The point at `range` (m) in a direction that is given relative to its axis.
+    fn turned(self, range: f64, way: Point) -> Point {
+        self.point(range * way.x, range * way.y)
+    }
+}
+
+/// The cells of points in equal steps on a line, in whole numbers of 2⁻³² of a cell: a tenth of the cost of a conversion for each.
+///
+/// Next to the border of a cell the last digits of the point decide. There it says nothing, and the cell is that of the point itself,
+/// so what is found does not depend on the short way being taken.
+struct Walk {
+    at: (i64, i64),
+    step: (i64, i64),
+    /// Whether it can tell anything.
+    sure: bool,
+}
+
+impl Walk {
+    /// So near to a border it says nothing, in 2⁻³² of a cell. The numbers of the walk err by less than one for each step, those of the points by less than one.
+    const DOUBT: u32 = 1 << 12;
+    /// More steps might add up to more than that.
+    const STEPS_MOST: i32 = 1 << 10;
+    /// Farther out (m) a point has not the digits.
+    const FARTHEST: f64 = 1e4;
+
+    /// From `steps` before the middle on.
+    fn new(middle: Point, step: Point, steps: i32) -> Walk {
+        let part = |x: f64| (x * (4_294_967_296.0 / CELL)) as i64;
+        let (from, step) = ((part(middle.x), part(middle.y)), (part(step.x), part(step.y)));
+        let steps = steps.min(Walk::STEPS_MOST + 1);
+        let near = middle.x.abs() < Walk::FARTHEST && middle.y.abs() < Walk::FARTHEST;
+        let sure = near && steps <= Walk::STEPS_MOST;
+        let back = i64::from(steps);
+        let at =
+            (from.0.wrapping_sub(step.0.wrapping_mul(back)), from.1.wrapping_sub(step.1.wrapping_mul(back)));
+        Walk { at, step, sure }
+    }
+
+    #[inline]
+    fn next(&mut self) -> Option<(i32, i32)> {
+        let (x, y) = self.at;
+        self.at = (x.wrapping_add(self.step.0), y.wrapping_add(self.step.1));
+        let off = |part: i64| (part as u32).wrapping_add(Walk::DOUBT);
+        let sure = self.sure && off(x).min(off(y)) > 2 * Walk::DOUBT;
+        sure.then_some(((x >> 32) as i32, (y >> 32) as i32))
     }
 }
 
@@ -572,7 +671,7 @@ mod tests {
         let cells = (y - span..=y + span).flat_map(|iy| (x - span..=x + span).map(move |ix| (ix, iy)));
         let occupied = cells.filter(|&(ix, iy)| {
             let cell = map.cells[slot(ix, iy)];
-            cell.evidence > 0 && cell.heard >= oldest && cell.tile == tile(ix, iy)
+            cell.evidence > 0 && map.heard[slot(ix, iy)] >= oldest && cell.tile == tile(ix, iy)
         });
         let (s, c) = (sin(pose.heading), cos(pose.heading));
         occupied
@@ -598,7 +697,7 @@ mod tests {
             }
             let now = at(40.0);
             let reach = reach.min(3.15);
-            let found: Vec<Point> = map.around(pose, reach, now).collect();
+            let found: Vec<Point> = map.around(pose, reach, now, 1).collect();
             prop_assert_eq!(found, around_by_hand(&map, pose, reach, now));
         }
 
@@ -614,6 +713,34 @@ mod tests {
             // As near to the reach as numbers can be.
             let point = Point::polar(f64::from_bits((reach.to_bits() as i64 + off).max(0) as u64), angle);
             prop_assert_eq!(is_within(point, reach), point.norm() <= reach);
+        }
+    }
+
+    #[test]
+    fn the_arcs_that_are_kept_are_those_that_would_be_computed() {
+        let arcs = Arcs::new(0.25);
+        for steps in 1..=Arcs::KEPT + 2 {
+            for step in -steps..=steps {
+                assert_eq!(arcs.way(step, steps), Arcs::compute(0.25, step, steps), "{step} of {steps}");
+            }
+        }
+    }
+
+    proptest! {
+        #[test]
+        fn a_walk_in_whole_numbers_finds_the_cells_of_the_points(
+            x in -9e4f64..9e4, y in -40f64..40.0, heading in -4f64..4.0, away in 0f64..3.0, steps in 0i32..60, far: bool, lined: bool
+        ) {
+            // With everything on the lattice each point lies on a border, where rounding decides.
+            let (x, y) = if lined { (CELL * (x as i32 / 1000) as f64, CELL * (y as i32) as f64) } else { (if far { x } else { x / 1e4 }, y) };
+            let pose = Pose::new(x, y, if lined { 0.0 } else { heading });
+            let sensor = Sensor::new(&MapParams { rim: 0.2, ..MapParams::default() }, pose, 0.0);
+            let mut walk = Walk::new(sensor.point(away, 0.0), sensor.left() * CELL, steps);
+            for step in -steps..=steps {
+                let exact = index(sensor.point(away, f64::from(step) * CELL));
+                let found = walk.next();
+                prop_assert!(found.is_none_or(|cell| cell == exact), "{:?} {:?}", found, exact);
+            }
         }
     }
 

@@ -33,7 +33,9 @@ pub struct Pose {
 /// The angle in [−π, π) that differs from `angle` by whole turns (rad).
 pub fn wrap(angle: f64) -> f64 {
     let turned = angle + PI;
-    let wrapped = turned - TAU * floor(turned / TAU) - PI;
+    // Most angles are in the range already. Next to its end the quotient decides.
+    let turns = if (0.0..TAU - 1e-9).contains(&turned) { 0.0 } else { floor(turned / TAU) };
+    let wrapped = turned - TAU * turns - PI;
     // Rounding can land exactly on the open end.
     if wrapped >= PI { wrapped - TAU } else { wrapped }
 }

@@ -61,6 +61,10 @@ impl Words {
     }
 
     pub(super) fn value(&self, inference: Inference) -> Option<f64> {
+        // A word without weight is not heard, so without weight there is no word: the common case, and the sets are large.
+        if self.weight == 0.0 {
+            return None;
+        }
         match inference {
             Inference::Sugeno => self.singletons.value(),
             // Claims of the negative side were made on its mirror image.
