@@ -44,10 +44,8 @@ impl Compass {
         let (x, y) = (&self.x[directions.clone()], &self.y[directions.clone()]);
         let limits = &limits[directions];
         // No way out at the first one: that would keep it from being done for several at a time.
-        x.iter()
-            .zip(y)
-            .zip(limits)
-            .fold(false, |any, ((x, y), limit)| any | (point.x * x + point.y * y < *limit))
+        let rows = x.iter().zip(y).zip(limits);
+        rows.fold(false, |any, ((x, y), limit)| any | (point.x * x + point.y * y < *limit))
     }
 }
 
@@ -99,7 +97,7 @@ impl Fan {
     ///
     /// A point at distance ρ, off the direction by δ, stops the body after ρ cos δ − √(room² − ρ² sin² δ). With a point nearer than
     /// `room` already it may go where it comes no nearer: then its distance counts in place of the room.
-    pub fn new(compass: &Compass, points: impl Iterator<Item = Point> + Clone, room: f64) -> Fan {
+    pub fn new(compass: &Compass, points: impl Iterator<Item = Point>, room: f64) -> Fan {
         let [fan] = Fan::of_rooms(compass, points, [room]);
         fan
     }
@@ -107,21 +105,18 @@ impl Fan {
     /// The fans for several rooms (m), at little more than the price of the largest.
     pub fn of_rooms<const N: usize>(
         compass: &Compass,
-        points: impl Iterator<Item = Point> + Clone,
+        points: impl Iterator<Item = Point>,
         rooms: [f64; N],
     ) -> [Fan; N] {
         let mut drawing = Drawing::new(compass, rooms);
-        // What is near hides most of the rest, which then costs next to nothing.
-        let mut from = 0.0;
-        for to in [0.5, 1.0, f64::INFINITY] {
-            for (number, point) in points.clone().enumerate() {
-                let square = point.dot(point);
-                if from <= square && square < to * to {
-                    drawing.add(number, point, sqrt(square));
-                }
+        let mut batch = Batch::default();
+        for (number, point) in points.enumerate() {
+            batch.put(number, point);
+            if batch.len == BATCH {
+                batch.draw(&mut drawing);
             }
-            from = to * to;
         }
+        batch.draw(&mut drawing);
         drawing.fans
     }
 
@@ -158,6 +153,47 @@ impl Fan {
     }
 }
 
+/// Points that are looked at together; a map of a room gives fewer.
+const BATCH: usize = 512;
+
+/// Points in the order of their distance: what is near hides most of the rest, which then costs next to nothing.
+struct Batch {
+    points: [Point; BATCH],
+    /// The square of the distance as bits, which are in order where numbers are; in the low digits the place of the point.
+    keys: [u64; BATCH],
+    len: usize,
+    /// The number of the first point.
+    first: usize,
+}
+
+impl Default for Batch {
+    fn default() -> Batch {
+        Batch { points: [Point::new(0.0, 0.0); BATCH], keys: [0; BATCH], len: 0, first: 0 }
+    }
+}
+
+impl Batch {
+    fn put(&mut self, number: usize, point: Point) {
+        if self.len == 0 {
+            self.first = number;
+        }
+        self.points[self.len] = point;
+        self.keys[self.len] = point.dot(point).to_bits() & !(BATCH as u64 - 1) | self.len as u64;
+        self.len += 1;
+    }
+
+    /// Draws the points and forgets them.
+    fn draw<const N: usize>(&mut self, drawing: &mut Drawing<'_, N>) {
+        let keys = &mut self.keys[..self.len];
+        keys.sort_unstable();
+        for key in keys {
+            let place = *key as usize % BATCH;
+            drawing.add(self.first + place, self.points[place]);
+        }
+        self.len = 0;
+    }
+}
+
 /// Fans in the making.
 struct Drawing<'a, const N: usize> {
     compass: &'a Compass,
@@ -189,8 +225,9 @@ impl<'a, const N: usize> Drawing<'a, N> {
         }
     }
 
-    /// Takes in a point; `away` is how far it is, but for the last digit.
-    fn add(&mut self, number: usize, point: Point, away: f64) {
+    /// Takes in a point.
+    fn add(&mut self, number: usize, point: Point) {
+        let away = sqrt(point.dot(point));
         // The last digit counts only for what is nearer than wanted, and it is dear.
         let distance = if away > self.most + 2.0 * NO_NEARER { away } else { point.norm() };
         let rooms = self.rooms.map(|room| fmin(room, distance - NO_NEARER));
@@ -204,9 +241,7 @@ impl<'a, const N: usize> Drawing<'a, N> {
         // The directions lie in a circle.
         for directions in [first..last.min(DIRECTIONS), 0..last.saturating_sub(DIRECTIONS)] {
             if self.compass.is_within(directions.clone(), point, &self.limits) {
-                for i in directions {
-                    self.offer(i, number, point, &rooms);
-                }
+                directions.for_each(|i| self.offer(i, number, point, &rooms));
             }
         }
     }

@@ -244,7 +244,7 @@ impl Roamer {
     }
 
     /// The free ways with much room, with some and with the least.
-    fn fans(&self, points: impl Iterator<Item = Point> + Clone) -> [Fan; 3] {
+    fn fans(&self, points: impl Iterator<Item = Point>) -> [Fan; 3] {
         let Parameters { keep, least, .. } = self.parameters;
         Fan::of_rooms(&self.compass, points, [keep, (keep + least) / 2.0, least])
     }
