@@ -173,8 +173,11 @@ fn worst(parameters: &Parameters, echo: Echo, bearing: f64) -> Echo {
 
 /// How far the body may roll straight on before it touches the echo.
 fn way_straight(parameters: &Parameters, echo: Echo) -> f64 {
-    let echo = worst(parameters, echo, 0.0);
     let half_width = parameters.radius + parameters.side_margin;
+    if is_surely_beside(fabs(echo.bearing) - parameters.cone, echo.range, half_width) {
+        return f64::INFINITY;
+    }
+    let echo = worst(parameters, echo, 0.0);
     // What lies beside the middle of the body or behind it is not in the way.
     let along = echo.range * cos(echo.bearing);
     if along <= 0.0 {
@@ -187,15 +190,33 @@ fn way_straight(parameters: &Parameters, echo: Echo) -> f64 {
     fmax(along - sqrt(fmax(parameters.radius * parameters.radius - across * across, 0.0)), 0.0)
 }
 
+/// Whether what lies `off` (rad) from straight ahead is behind the middle of the body or farther across than `half_width`, told without a
+/// sine: that is so of most of what is around. It says no where rounding might decide.
+fn is_surely_beside(off: f64, range: f64, half_width: f64) -> bool {
+    let off = off - HAIR;
+    // sin x ≥ x − x³/6.
+    off > PI / 2.0 || (off > 0.0 && range * off * (1.0 - off * off / 6.0) > half_width)
+}
+
+/// More than rounding changes of an angle or a length (rad, m).
+const HAIR: f64 = 1e-9;
+
 /// How far along an arc the body may roll before it touches the echo, in the middle of its cone.
 ///
 /// The centre of the turn lies at (0, 1/κ); a point is swept if its distance from there differs from |1/κ| by less than the half width.
 fn way_curved(parameters: &Parameters, echo: Echo, curvature: f64) -> f64 {
     let turn_radius = fabs(1.0 / curvature);
     let half_width = parameters.radius + parameters.side_margin;
+    if fabs(echo.bearing) > PI / 2.0 + HAIR {
+        return f64::INFINITY;
+    }
     let side = if curvature > 0.0 { 1.0 } else { -1.0 };
     // Mirrored to a left turn, seen from the centre of the turn; the robot stands straight below it.
     let (x, y) = (echo.range * cos(echo.bearing), echo.range * sin(echo.bearing) * side - turn_radius);
+    // The last digit of the length is dear, and it counts only for what lies on the edge.
+    if fabs(sqrt(x * x + y * y) - turn_radius) > half_width + HAIR * (1.0 + turn_radius) {
+        return f64::INFINITY;
+    }
     let from_centre = libm::hypot(x, y);
     if fabs(from_centre - turn_radius) >= half_width || from_centre < 1e-9 {
         return f64::INFINITY;
@@ -312,7 +333,49 @@ mod tests {
         assert!(!out.forward && out.danger == 1.0);
     }
 
+    /// The ways as their laws say them, with every sine and length.
+    fn ways_by_hand(parameters: &Parameters, echo: Echo, curvature: f64) -> (f64, f64) {
+        let half_width = parameters.radius + parameters.side_margin;
+        let seen = worst(parameters, echo, 0.0);
+        let (along, across) = (seen.range * cos(seen.bearing), fabs(seen.range * sin(seen.bearing)));
+        let straight = if along <= 0.0 || across >= half_width {
+            f64::INFINITY
+        } else {
+            fmax(along - sqrt(fmax(parameters.radius * parameters.radius - across * across, 0.0)), 0.0)
+        };
+        let (turn_radius, side) = (fabs(1.0 / curvature), if curvature > 0.0 { 1.0 } else { -1.0 });
+        let (x, y) = (echo.range * cos(echo.bearing), echo.range * sin(echo.bearing) * side - turn_radius);
+        let (away, angle) = (libm::hypot(x, y), libm::atan2(x, -y));
+        let beside = fabs(away - turn_radius) >= half_width || away < 1e-9;
+        if beside || angle <= 0.0 || angle > PI / 2.0 || x <= 0.0 {
+            return (straight, f64::INFINITY);
+        }
+        let cosine =
+            (turn_radius * turn_radius + away * away - half_width * half_width) / (2.0 * turn_radius * away);
+        let touch = libm::acos(fmin(fmax(cosine, -1.0), 1.0));
+        (straight, fmax((angle - touch) * turn_radius, 0.0))
+    }
+
     proptest! {
+        #[test]
+        fn the_short_ways_to_tell_what_is_beside_change_no_bit(
+            bearing in -PI..PI, range in 0.01f64..4.0, cone in 0f64..0.5, curvature in prop_oneof![-9f64..-0.05, 0.05f64..9.0],
+            edge in 0usize..4
+        ) {
+            let parameters = Parameters { cone, ..parameters() };
+            let half_width = parameters.radius + parameters.side_margin;
+            // On the edges of what is swept, where the last digit decides.
+            let range = match edge {
+                0 => half_width / sin(fmax(fabs(bearing) - cone, 0.01)),
+                1 => half_width,
+                _ => range,
+            };
+            let bearing = if edge == 3 { PI / 2.0 } else { bearing };
+            let echo = Echo { bearing, range };
+            let ways = (way_straight(&parameters, echo), way_curved(&parameters, echo, curvature));
+            prop_assert_eq!(ways, ways_by_hand(&parameters, echo, curvature));
+        }
+
         #[test]
         fn one_ring_for_both_is_judged_as_two_that_are_the_same(
             beams in prop::collection::vec((-3.2f64..3.2, -0.1f64..3.0), 0..30), linear in -0.3f64..0.6, angular in -1f64..1.0
