@@ -1,6 +1,6 @@
 //! Laser ranges: one ray a beam, with noise and beams that do not return.
 
-use libm::{cos, sin};
+use libm::sincos;
 use types::geometry::TAU;
 use types::{Point, Pose};
 
@@ -31,7 +31,7 @@ pub(crate) fn scan(
     draw: Stream,
     out: &mut [f32],
 ) -> usize {
-    let (s, c) = (sin(pose.heading), cos(pose.heading));
+    let (s, c) = sincos(pose.heading);
     let origin = pose.position();
     let count = beams.len().min(out.len());
     for (pair, ranges) in out[..count].chunks_mut(2).enumerate() {

@@ -4,7 +4,7 @@
 //! fan of rays for the faces, and the edges and round things in it one by one. To the range come noise in proportion,
 //! constant noise, and false short readings from the neighbours' pulses.
 
-use libm::{cos, sin, sqrt, tan};
+use libm::{cos, sincos, sqrt, tan};
 use types::Point;
 
 use crate::field::{Field, Met, Scatterer};
@@ -51,7 +51,7 @@ impl Fan {
         body: u32,
         which: usize,
     ) -> Option<f64> {
-        let (s, c) = (sin(pose.heading), cos(pose.heading));
+        let (s, c) = sincos(pose.heading);
         let turn = |p: Point| Point::new(c * p.x - s * p.y, s * p.x + c * p.y);
         let axis = turn(self.axes[which]);
         let origin = pose.position() + axis * self.mount;

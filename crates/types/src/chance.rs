@@ -4,7 +4,7 @@
 //! The mixer is the finaliser of SplitMix64 (Steele, Lea, Flood 2014); normal numbers are by Box and Muller.
 
 use crate::geometry::TAU;
-use libm::{cos, log, sin, sqrt};
+use libm::{log, sincos, sqrt};
 
 const GOLDEN: u64 = 0x9e37_79b9_7f4a_7c15;
 
@@ -63,7 +63,8 @@ impl Stream {
         // One minus the draw lies in (0, 1], so the logarithm is finite.
         let radius = sqrt(-2.0 * log(1.0 - self.uniform(number.wrapping_mul(2))));
         let angle = TAU * self.uniform(number.wrapping_mul(2).wrapping_add(1));
-        (radius * cos(angle), radius * sin(angle))
+        let (s, c) = sincos(angle);
+        (radius * c, radius * s)
     }
 
     /// A normal number of mean 0 and deviation 1.

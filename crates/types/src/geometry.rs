@@ -1,6 +1,6 @@
 //! Positions, poses and velocities in the plane. Metres, radians, counter-clockwise positive, x forward, y left.
 
-use libm::{atan2, cos, floor, hypot, sin};
+use libm::{atan2, floor, hypot, sin, sincos};
 
 /// π, and the full turn.
 pub use core::f64::consts::{PI, TAU};
@@ -48,7 +48,8 @@ impl Point {
 
     /// The point at `distance` in the direction `bearing`.
     pub fn polar(distance: f64, bearing: f64) -> Point {
-        Point { x: distance * cos(bearing), y: distance * sin(bearing) }
+        let (s, c) = sincos(bearing);
+        Point { x: distance * c, y: distance * s }
     }
 
     /// Length of the vector (m).
@@ -117,13 +118,13 @@ impl Pose {
 
     /// `b_from_a` of `self = a_from_b`.
     pub fn inverse(self) -> Pose {
-        let (s, c) = (sin(self.heading), cos(self.heading));
+        let (s, c) = sincos(self.heading);
         Pose { x: -c * self.x - s * self.y, y: s * self.x - c * self.y, heading: wrap(-self.heading) }
     }
 
     /// The point in the frame of the pose, for a point given in the body's frame.
     pub fn transform(self, point: Point) -> Point {
-        let (s, c) = (sin(self.heading), cos(self.heading));
+        let (s, c) = sincos(self.heading);
         Point { x: self.x + c * point.x - s * point.y, y: self.y + s * point.x + c * point.y }
     }
 
@@ -145,6 +146,7 @@ impl Pose {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use libm::cos;
 
     fn close(a: f64, b: f64) -> bool {
         libm::fabs(a - b) < 1e-9
@@ -162,6 +164,13 @@ mod tests {
             let w = wrap(angle);
             proptest::prop_assert!((-PI..PI).contains(&w));
             proptest::prop_assert!(libm::fabs(sin(w) - sin(angle)) < 1e-9 && libm::fabs(cos(w) - cos(angle)) < 1e-9);
+        }
+
+        #[test]
+        fn sine_and_cosine_together_are_to_the_last_bit_those_alone(angle in -1e6f64..1e6, exponent in -40i32..3) {
+            for angle in [angle, angle * 1e-6, libm::ldexp(angle * 1e-6, exponent)] {
+                proptest::prop_assert_eq!(sincos(angle), (sin(angle), cos(angle)));
+            }
         }
 
         #[test]
