@@ -253,19 +253,25 @@ impl<'a, const N: usize> Drawing<'a, N> {
             return;
         }
         let across = point.cross(self.compass.at(i));
-        for k in 0..N {
-            let (room, fan) = (rooms[k], &mut self.fans[k]);
-            let under = room * room - across * across;
-            // The root is at most the room: what is too far even with that needs no root.
-            if room <= 0.0 || under <= 0.0 || along - room > fan.ways[i] {
-                continue;
-            }
-            let way = along - sqrt(under);
+        // Most is too late for all fans: one branch for them together.
+        let may_stop: [bool; N] = core::array::from_fn(|k| {
+            let under = rooms[k] * rooms[k] - across * across;
+            let behind = along - self.fans[k].ways[i];
+            // along − √under > way where (along − way)² > under. What is as near to equal as rounding may be is looked at.
+            let too_late = (behind > 0.0) & (behind * behind > under + HAIR * (1.0 + along * along));
+            (rooms[k] > 0.0) & (under > 0.0) & !too_late
+        });
+        if !may_stop.iter().fold(false, |any, may| any | may) {
+            return;
+        }
+        for k in (0..N).filter(|k| may_stop[*k]) {
+            let fan = &mut self.fans[k];
+            let way = along - sqrt(rooms[k] * rooms[k] - across * across);
             if way < fan.ways[i] || (way == fan.ways[i] && number < self.numbers[k][i]) {
                 (fan.ways[i], fan.stops[i], self.numbers[k][i]) = (way, point, number);
-                self.limit(i);
             }
         }
+        self.limit(i);
     }
 
     fn limit(&mut self, i: usize) {
