@@ -123,10 +123,10 @@ const LAST: f64 = 0.35;
 const IN_PLACE: f64 = 0.8;
 /// How far it turns away from what is as near as can be told (rad): a hand's width in a metre.
 const SHY: f64 = 0.1;
-/// The part of the speed with the least room.
-const NARROW: f64 = 0.5;
-/// With nothing nearer than this it drives at full speed (m).
-const OPEN: f64 = 1.0;
+/// The part of the speed with which it begins, while it has heard nothing but from one place.
+const YOUNG: f64 = 0.25;
+/// After this way it has heard what is around from several places (m).
+const SEEN_AROUND: f64 = 1.0;
 /// As long as it moves no farther than this it has not got away (m).
 const SPOT: f64 = 0.5;
 /// Less new ground than this is none (m²): an edge of what was seen before.
@@ -159,6 +159,8 @@ pub struct Roamer {
     /// The least that this way has cost, and how long it costs no less (s).
     least_cost: f64,
     gain_age: f64,
+    /// How far it has gone (m).
+    travelled: f64,
     spot: Point,
     spot_since: f64,
     /// How long it has come to nothing new (s).
@@ -182,6 +184,7 @@ impl Roamer {
             way_age: 0.0,
             least_cost: 0.0,
             gain_age: 0.0,
+            travelled: 0.0,
             spot: pose.position(),
             spot_since: 0.0,
             stale: 0.0,
@@ -220,15 +223,13 @@ impl Roamer {
         let points = points.map(|p| Point::new(p.x, p.y * sign));
         self.remember(pose, ground, fmax(dt, 0.0));
         let fans = self.fans(points.clone());
-        let near = points.clone();
         let wanted = match self.mode {
             Mode::Search => self.search(&fans, ground),
             Mode::Following => self.follow(points, &fans, ground),
             Mode::Leaving => self.leave(&fans, ground),
         };
         let beside = if sign > 0.0 { beside } else { Beside { left: beside.right, right: beside.left } };
-        let nearest = near.fold(f64::INFINITY, |near, point| fmin(near, point.norm()));
-        let twist = self.drive(wanted, &fans, beside, nearest, dt);
+        let twist = self.drive(wanted, &fans, beside, dt);
         Twist::new(twist.linear, twist.angular * sign)
     }
 
@@ -237,7 +238,9 @@ impl Roamer {
     }
 
     fn remember(&mut self, pose: Pose, ground: &mut Ground, dt: f64) {
+        let before = self.pose.position();
         self.pose = mirrored(pose, self.parameters.side);
+        self.travelled += before.distance(self.pose.position());
         let new = ground.tread(pose.position(), self.parameters.near);
         self.stale = if new >= SOME { 0.0 } else { self.stale + dt };
         self.way_age += dt;
@@ -400,14 +403,7 @@ impl Roamer {
         })
     }
 
-    fn drive(
-        &mut self,
-        wanted: Option<usize>,
-        fans: &[Fan; 3],
-        beside: Beside,
-        nearest: f64,
-        dt: f64,
-    ) -> Twist {
+    fn drive(&mut self, wanted: Option<usize>, fans: &[Fan; 3], beside: Beside, dt: f64) -> Twist {
         let p = self.parameters;
         let Some(wanted) = wanted else {
             // No way at all: look around, what was heard may not be there any more.
@@ -418,9 +414,8 @@ impl Roamer {
         let straightness = fmax(1.0 - fabs(error) / IN_PLACE, 0.0);
         let ahead = fmin(fans[2].way(0), fans[2].way(wanted));
         let clearness = fmin(fmax(ahead / p.look, 0.0), 1.0);
-        // Between two things it is slower: more is heard of them while they are passed.
-        let room = fmin(fmax((nearest - p.least) / (OPEN - p.least), NARROW), 1.0);
-        let allowed = p.speed * straightness * clearness * room;
+        let known = fmin(YOUNG + (1.0 - YOUNG) * self.travelled / SEEN_AROUND, 1.0);
+        let allowed = p.speed * straightness * clearness * known;
         let allowed = if ahead > 0.1 && straightness > 0.0 { fmax(allowed, p.creep) } else { 0.0 };
         self.speed = fmin(allowed, self.speed + p.growth * fmax(dt, 0.0));
         Twist::new(self.speed, fmin(fmax(p.turn_gain * error, -p.turn_max), p.turn_max))
