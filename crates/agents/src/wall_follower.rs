@@ -223,6 +223,7 @@ mod tests {
         for i in 0..40 {
             params.speed = if i < 20 { 0.4 } else { 0.1 };
             let stamp = Time::ZERO + Duration::millis(250 * i);
+            walk.pose = Some(Pose::new(0.1 * i as f64, 0.0, 0.0));
             walk.hear(&params, &ranges, None, stamp);
             speed = walk.advance(&params, stamp).unwrap().twist.linear;
             assert!(i != 19 || speed > 0.3, "{speed}");
