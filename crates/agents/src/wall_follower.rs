@@ -33,11 +33,11 @@ pub struct WallParams {
     /// Way that must be free ahead (m). 0.65 is more than the body is long; a niche that is not deeper is taken for wall.
     #[param(default = 0.65, min = 0.05, max = 3.0)]
     pub look: f64,
-    /// Speed with all free (m/s). 0.55 is what a ring that is heard four times a second allows: an eighth of a metre a reading.
-    #[param(default = 0.55, min = 0.0, max = 5.0)]
+    /// Speed with all free (m/s). 0.5 is what a ring that is heard four times a second allows: an eighth of a metre a reading.
+    #[param(default = 0.5, min = 0.0, max = 5.0)]
     pub speed: f64,
-    /// How fast the wished speed grows while all is free (m/s²). 0.4 takes a second and a half to full speed, in which more is heard.
-    #[param(default = 0.4, min = 0.0, max = 5.0)]
+    /// How fast the wished speed grows while all is free (m/s²). 0.3 takes a second and a half to full speed, in which more is heard.
+    #[param(default = 0.3, min = 0.0, max = 5.0)]
     pub growth: f64,
     /// Distance from the rim up to which a thing may be nearer than it is told (m). 0.17: a sonar tells 0.15 m of all that is nearer.
     #[param(default = 0.17, min = 0.0, max = 2.0)]
