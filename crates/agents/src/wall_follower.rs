@@ -129,17 +129,35 @@ impl Agent for WallFollower {
 }
 
 /// The roamer, what it remembers, and where it was at the step before.
-#[derive(Debug, Default)]
+#[derive(Debug)]
 struct Walk {
     map: LocalMap,
     ground: Ground,
-    /// What is around in this step; kept for its memory.
+    /// What is around in this step. Its memory is taken when the agent is made, so no step takes any.
     points: Vec<Point>,
     roamer: Option<Roamer>,
     pose: Option<Pose>,
     heard: Option<Time>,
     beside: Beside,
     last: Option<Time>,
+}
+
+/// So many points are looked at; with all cells taken there would be as many within the longest reach.
+const POINTS: usize = 16_384;
+
+impl Default for Walk {
+    fn default() -> Walk {
+        Walk {
+            map: LocalMap::default(),
+            ground: Ground::default(),
+            points: Vec::with_capacity(POINTS),
+            roamer: None,
+            pose: None,
+            heard: None,
+            beside: Beside::default(),
+            last: None,
+        }
+    }
 }
 
 impl Walk {
@@ -171,8 +189,8 @@ impl Walk {
         let left = roamer.times_left();
         // The roamer looks at them several times; finding them is dear.
         self.points.clear();
-        self.points.extend(self.map.around(here, params.reach(), now, 2));
-        self.points.extend(self.map.around(here, CLOSE, now, 1));
+        let close = self.map.around(here, CLOSE, now, 1);
+        self.points.extend(close.chain(self.map.around(here, params.reach(), now, 2)).take(POINTS));
         let points = self.points.iter().copied();
         let twist = roamer.step(points, self.beside, here, &mut self.ground, (now - before).seconds());
         if roamer.times_left() > left {

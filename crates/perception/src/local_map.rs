@@ -120,7 +120,7 @@ impl LocalMap {
     /// Changes the parameters; what was heard is kept.
     pub fn set_params(&mut self, params: MapParams) {
         if params.cone != self.params.cone {
-            self.arcs = Arcs::new(ARC * params.cone);
+            self.arcs.open(ARC * params.cone);
         }
         self.params = params;
     }
@@ -415,8 +415,19 @@ impl Arcs {
     const KEPT: i32 = 30;
 
     fn new(half: f64) -> Arcs {
+        let kept = (Arcs::KEPT + 1) * (Arcs::KEPT + 1) - 1;
+        let mut arcs = Arcs { half, ways: vec![Point::default(); kept as usize] };
+        arcs.open(half);
+        arcs
+    }
+
+    /// Changes half of the arc, without new memory: parameters change while the robot drives.
+    fn open(&mut self, half: f64) {
         let arcs = (1..=Arcs::KEPT).flat_map(|steps| (-steps..=steps).map(move |step| (step, steps)));
-        Arcs { half, ways: arcs.map(|(step, steps)| Arcs::compute(half, step, steps)).collect() }
+        self.half = half;
+        for (way, (step, steps)) in self.ways.iter_mut().zip(arcs) {
+            *way = Arcs::compute(half, step, steps);
+        }
     }
 
     /// How many steps to either side there are at `range` (m).
