@@ -190,7 +190,7 @@ impl Walk {
         // The roamer looks at them several times; finding them is dear.
         self.points.clear();
         let close = self.map.around(here, CLOSE, now, 1);
-        self.points.extend(close.chain(self.map.around(here, params.reach(), now, 2)).take(POINTS));
+        self.points.extend(self.map.around(here, params.reach(), now, 2).chain(close).take(POINTS));
         let points = self.points.iter().copied();
         let twist = roamer.step(points, self.beside, here, &mut self.ground, (now - before).seconds());
         if roamer.times_left() > left {
