@@ -508,7 +508,7 @@ fn to_and_fro(robot: f64) -> (f64, f64, sim::Truth) {
     let (mut low, mut high) = (f64::INFINITY, f64::NEG_INFINITY);
     for i in 1..=400 {
         world.run_until(Time::from_seconds(0.1 * f64::from(i)));
-        let x = world.locate("walker").unwrap().0.x;
+        let x = world.locate("walker").expect("the walker is in the world").0.x;
         // The first five seconds are the way to the far end.
         (low, high) = (low.min(x), if i > 50 { high.max(x) } else { high });
     }
