@@ -154,7 +154,7 @@ impl Converter {
         for red_green in -255i32..=255 {
             for red_blue in -255i32..=255 {
                 let exact = hue(f64::from(red_green), f64::from(red_blue));
-                table[hue_index(red_green, red_blue) as usize] = step_of_hue(exact);
+                table[hue_index(red_green, red_blue) as usize % (SIDE * SIDE)] = step_of_hue(exact);
             }
         }
         Converter { hue: table }
@@ -167,11 +167,13 @@ impl Converter {
         let hue = &*self.hue;
         let (blocks, rest) = rgb.as_chunks::<3>().0.as_chunks::<BLOCK>();
         let (hsi_blocks, hsi_rest) = hsi.as_chunks_mut::<3>().0.as_chunks_mut::<BLOCK>();
+        let mut scratch = Scratch::new();
         for (from, to) in blocks.iter().zip(hsi_blocks) {
-            convert_block(hue, from, to);
+            convert_block(hue, from, to, &mut scratch);
         }
+        let mut scratch = Scratch::new();
         for (from, to) in rest.as_chunks::<1>().0.iter().zip(hsi_rest.as_chunks_mut::<1>().0) {
-            convert_block(hue, from, to);
+            convert_block(hue, from, to, &mut scratch);
         }
         Ok(())
     }
@@ -248,20 +250,34 @@ fn all_three(inside: &[u8; 24]) -> [u8; 8] {
     (all ^ far ^ (far << 32)).to_le_bytes()
 }
 
+/// What lies between the loops of a conversion.
+struct Scratch<const N: usize> {
+    pixel: [u32; N],
+    index: [u32; N],
+    shade: [u32; N],
+}
+
+impl<const N: usize> Scratch<N> {
+    fn new() -> Scratch<N> {
+        Scratch { pixel: [0; N], index: [0; N], shade: [0; N] }
+    }
+}
+
 /// Converts N pixels. The loops are apart so that the middle one, the arithmetic, runs on whole vectors; a pixel is read
 /// and written as one word of four bytes, since byte by byte the writing would take longer than the rest.
 #[inline(always)]
-fn convert_block<const N: usize>(hue: &[u8; SIDE * SIDE], rgb: &[[u8; 3]; N], hsi: &mut [[u8; 3]; N]) {
-    let (rgb, hsi) = (rgb.as_flattened(), hsi.as_flattened_mut());
-    let mut pixel = [0u32; N];
-    for i in 0..N - 1 {
-        pixel[i] = u32::from_le_bytes([rgb[3 * i], rgb[3 * i + 1], rgb[3 * i + 2], rgb[3 * i + 3]]);
-    }
-    pixel[N - 1] = u32::from_le_bytes([rgb[3 * N - 3], rgb[3 * N - 2], rgb[3 * N - 1], 0]);
-    let (mut index, mut shade) = ([0u32; N], [0u32; N]);
+fn convert_block<const N: usize>(
+    hue: &[u8; SIDE * SIDE],
+    rgb: &[[u8; 3]; N],
+    hsi: &mut [[u8; 3]; N],
+    scratch: &mut Scratch<N>,
+) {
+    let Scratch { pixel, index, shade } = scratch;
+    load(rgb, pixel);
     for i in 0..N {
         (index[i], shade[i]) = index_and_shade(pixel[i]);
     }
+    let hsi = hsi.as_flattened_mut();
     for i in 0..N - 1 {
         let word = shade[i] | u32::from(hue[index[i] as usize % (SIDE * SIDE)]);
         // The fourth byte is overwritten by the next pixel.
@@ -271,33 +287,45 @@ fn convert_block<const N: usize>(hue: &[u8; SIDE * SIDE], rgb: &[[u8; 3]; N], hs
     hsi[3 * N - 3..].copy_from_slice(&word.to_le_bytes()[..3]);
 }
 
+/// Reads pixels as words, R lowest. The fourth byte is the next pixel's first, and of the last pixel 0.
+#[inline(always)]
+fn load<const N: usize>(rgb: &[[u8; 3]; N], pixel: &mut [u32; N]) {
+    let rgb = rgb.as_flattened();
+    for i in 0..N - 1 {
+        pixel[i] = u32::from_le_bytes([rgb[3 * i], rgb[3 * i + 1], rgb[3 * i + 2], rgb[3 * i + 3]]);
+    }
+    pixel[N - 1] = u32::from_le_bytes([rgb[3 * N - 3], rgb[3 * N - 2], rgb[3 * N - 1], 0]);
+}
+
 /// Where the table has the hue of a pixel, and the word 0 S I 0 that lacks only the hue. The bytes of `pixel` are R G B x.
 ///
 /// In whole numbers but for the one division, which is in single precision: of both every processor has vectors.
 #[inline(always)]
 fn index_and_shade(pixel: u32) -> (u32, u32) {
+    /// Of 765 a little less. The share of grey, 765 least / sum, is to be rounded with halves down, so that what it leaves of 255 is
+    /// rounded with halves up. Any other value of this fraction is at least 1/1530 away from a half, and this moves it by less.
+    const NEARLY_765: f32 = 765.0 * (1.0 - 1.0 / 1_048_576.0);
+    /// So little that only 0 / 0 changes by it: black, too, is all grey.
+    const NOTHING: f32 = 1e-30;
     let channel = |shift: u32| ((pixel >> shift) & 0xff) as i32;
     let (r, g, b) = (channel(0), channel(8), channel(16));
     let (sum, least) = (r + g + b, r.min(g).min(b));
-    // 255 (sum − 3 least) / sum, rounded. Black has nothing above grey; its sum must only not be 0. Another value of this fraction is
-    // at least 1/1530 away from a half: the addend of 1/4096 turns halves upwards, nothing else.
-    let (whole, grey) = (sum as f32, least as f32);
-    let share = (whole * (255.0 + 1.0 / 4096.0) - grey * 765.0) / if whole < 1.0 { 1.0 } else { whole };
-    // 10923 / 2¹⁵ is a third and a hundred-thousandth: too little more to reach the next whole number.
-    let intensity = ((sum * 10_923 + (1 << 14)) >> 15) as u32;
-    (hue_index(r - g, r - b), (nearest(share) << 8) | (intensity << 16))
+    let grey = (least as f32 * NEARLY_765 + 255.0 * NOTHING) / (sum as f32 + NOTHING);
+    // 21846 / 2¹⁶ is a third and a hundred-thousandth: too little more to reach the next whole number. Its third byte is I.
+    let intensity = (21_846 * sum + 21_846) as u32 & 0x00ff_0000;
+    (hue_index(r - g, r - b), (!(nearest(grey) << 8) & 0xff00) | intensity)
 }
 
-/// The whole number nearest to `x`, for x in 0 ..= 255: adding 2²³ leaves it in the low bits.
+/// The whole number nearest to `x`, for x in 0 ..= 255, in the lowest byte: adding 2²³ leaves it there.
 #[inline(always)]
 fn nearest(x: f32) -> u32 {
-    (x + 8_388_608.0).to_bits() & 0xff
+    (x + 8_388_608.0).to_bits()
 }
 
-/// Where the table has the hue for the two differences of two bytes.
+/// Where the table has the hue for the two differences of two bytes, but for whole turns of the table.
 #[inline(always)]
 fn hue_index(red_green: i32, red_blue: i32) -> u32 {
-    (red_green * SIDE as i32 + red_blue + (256 * SIDE + 256) as i32) as u32
+    (red_green * SIDE as i32 + red_blue) as u32
 }
 
 /// Hue from R−G and R−B, on any common scale (rad, in [0, 2π)).
