@@ -69,9 +69,9 @@ pub struct Converter {
 
 /// A [`ColourRange`] in the steps of a picture: per channel the first step and how many follow it.
 #[derive(Clone, Copy, Debug)]
-struct Steps {
-    first: [u8; 3],
-    more: [u8; 3],
+pub(crate) struct Steps {
+    pub(crate) first: [u8; 3],
+    pub(crate) more: [u8; 3],
 }
 
 /// The exact hue, saturation and intensity of a colour given as R, G, B bytes.
@@ -160,6 +160,14 @@ impl Converter {
         Converter { hue: table }
     }
 
+    /// The step of hue of a pixel whose bytes are R G B x.
+    #[inline(always)]
+    pub(crate) fn hue_step(&self, pixel: u32) -> u8 {
+        let channel = |shift: u32| ((pixel >> shift) & 0xff) as i32;
+        let (r, g, b) = (channel(0), channel(8), channel(16));
+        self.hue[hue_index(r - g, r - b) as usize % (SIDE * SIDE)]
+    }
+
     /// Converts the picture `rgb` to `hsi`, three bytes a pixel in both.
     pub fn convert(&self, rgb: &[u8], hsi: &mut [u8]) -> Result<(), WrongLength> {
         check("rgb", rgb.len(), rgb.len() / 3 * 3)?;
@@ -180,7 +188,7 @@ impl Converter {
 }
 
 impl Steps {
-    fn of(range: &ColourRange) -> Steps {
+    pub(crate) fn of(range: &ColourRange) -> Steps {
         let (from, to) = (step_of_hue(range.hue_from), step_of_hue(range.hue_to));
         let width = range.hue_to - range.hue_from;
         let width = width - TAU * floor(width / TAU);
@@ -289,7 +297,7 @@ fn convert_block<const N: usize>(
 
 /// Reads pixels as words, R lowest. The fourth byte is the next pixel's first, and of the last pixel 0.
 #[inline(always)]
-fn load<const N: usize>(rgb: &[[u8; 3]; N], pixel: &mut [u32; N]) {
+pub(crate) fn load<const N: usize>(rgb: &[[u8; 3]; N], pixel: &mut [u32; N]) {
     let rgb = rgb.as_flattened();
     for i in 0..N - 1 {
         pixel[i] = u32::from_le_bytes([rgb[3 * i], rgb[3 * i + 1], rgb[3 * i + 2], rgb[3 * i + 3]]);
