@@ -176,7 +176,7 @@ impl Column {
     }
 }
 
-/// Columns are drawn this many at a time, each in one piece, and then written row by row: four pixels are three words.
+/// Columns are drawn this many at a time, each in one piece, and then written row by row: two words a row.
 const TILE: usize = 4;
 
 /// A colour in one word, red lowest.
@@ -186,22 +186,23 @@ fn packed(colour: [u8; 3]) -> u32 {
 }
 
 /// Writes the columns of a tile, one after another in `tile`, to the image from byte `from` of each row on.
+///
+/// Two pixels are written as a word of eight bytes, of which six are theirs: up to two bytes of the next tile are spoilt, so
+/// tiles are written from left to right.
 fn write_tile(tile: &[u32], image: &mut [u8], stride: usize, from: usize) {
     let (ab, cd) = tile.split_at(tile.len() / 2);
     let ((a, b), (c, d)) = (ab.split_at(ab.len() / 2), cd.split_at(cd.len() / 2));
-    let to = (from + 3 * TILE).min(stride);
+    let pair = |left: u32, right: u32| (u64::from(left) | u64::from(right) << 24).to_le_bytes();
     let columns = a.iter().zip(b).zip(c).zip(d);
     for (row, (((a, b), c), d)) in image.chunks_exact_mut(stride).zip(columns) {
-        let words = [a | b << 24, b >> 8 | c << 16, c >> 16 | d << 8];
-        let out = &mut row[from..to];
-        if let Ok(out) = <&mut [u8; 3 * TILE]>::try_from(&mut *out) {
-            out[0..4].copy_from_slice(&words[0].to_le_bytes());
-            out[4..8].copy_from_slice(&words[1].to_le_bytes());
-            out[8..12].copy_from_slice(&words[2].to_le_bytes());
+        let (left, right) = (pair(*a, *b), pair(*c, *d));
+        if from + 3 * TILE + 2 <= stride {
+            row[from..from + 8].copy_from_slice(&left);
+            row[from + 6..from + 14].copy_from_slice(&right);
         } else {
-            // The last columns of an image whose width is no multiple of four.
-            let bytes = words.into_iter().flat_map(u32::to_le_bytes);
-            out.iter_mut().zip(bytes).for_each(|(out, byte)| *out = byte);
+            // The last columns end with the row.
+            let bytes = left[..6].iter().chain(&right[..6]);
+            row[from..].iter_mut().zip(bytes).for_each(|(out, byte)| *out = *byte);
         }
     }
 }
