@@ -1,14 +1,14 @@
 //! The image tracker: the largest region of a colour is the target; the head keeps it in the middle, the feet come close.
 //!
 //! ```text
-//!  hsi ─▶ split by hue ─▶ largest region ─▶ bearing, share ─▶ pursuit ─┬─▶ drive (an offer)
-//!  head ────────────────────────────────────────────────────▶          ├─▶ look (a wish for the head)
-//!                                                                      └─▶ target
+//!  rgb or hsi ─▶ split by hue ─▶ largest region ─▶ bearing, share ─▶ pursuit ─┬─▶ drive (an offer)
+//!  head ───────────────────────────────────────────────────────────▶          ├─▶ look (a wish for the head)
+//!                                                                             └─▶ target
 //! ```
 
 use motion::pursuit::{Mode, Orders, Parameters, Pursuit, Sighting};
 use perception::blobs::{BlobFinder, BlobParams};
-use perception::colour::{ColourRange, in_range};
+use perception::colour::{ColourRange, Converter, in_range};
 use perception::picture::Size;
 use perception::target::{Camera, target};
 use runtime::{Agent, Fault, Input, Output, Step};
@@ -91,8 +91,10 @@ impl TrackerParams {
 /// Finds the largest region of a colour, turns the head to it, comes close and stops before it.
 #[derive(Agent)]
 pub struct ImageTracker {
-    /// Pictures as hue, saturation and intensity.
+    /// Pictures as hue, saturation and intensity, where somebody makes them anyway.
     hsi: Input<Image>,
+    /// Pictures as the camera takes them. They give the same target, and are split without being converted.
+    rgb: Input<Image>,
     /// Where the head looks; without it the camera looks ahead.
     head: Input<Head>,
     /// Where the target is and how much it is to be followed.
@@ -110,6 +112,9 @@ pub struct ImageTracker {
 impl Agent for ImageTracker {
     fn start(&mut self, _: &mut Step) -> Result<(), Fault> {
         self.eye.fit(Size::new(320, 240));
+        if self.rgb.is_wired() {
+            self.eye.learn_colours();
+        }
         Ok(())
     }
 
@@ -117,7 +122,7 @@ impl Agent for ImageTracker {
         if let Some(head) = self.head.latest() {
             self.hunt.head = head;
         }
-        let Some(picture) = self.hsi.newest() else { return Ok(()) };
+        let Some(picture) = self.rgb.newest().or_else(|| self.hsi.newest()) else { return Ok(()) };
         let stamp = picture.header().stamp;
         // Where the head looked when the picture was taken, not where it looks by now.
         let head = self.head.at(stamp).map_or(self.hunt.head, |found| found.value());
@@ -135,6 +140,8 @@ impl Agent for ImageTracker {
 /// What finds the target in a picture; made for one size of pictures.
 #[derive(Default)]
 struct Eye {
+    /// What tells the hue of a pixel; only RGB pictures need it.
+    colours: Option<Converter>,
     mask: Vec<u8>,
     finder: Option<BlobFinder<8>>,
 }
@@ -148,20 +155,32 @@ impl Eye {
         }
     }
 
+    /// Gets ready for RGB pictures; nothing when it is already.
+    fn learn_colours(&mut self) {
+        self.colours.get_or_insert_default();
+    }
+
     fn see(
         &mut self,
         params: &TrackerParams,
         picture: &Image,
         row: &[u8],
     ) -> Result<Option<Sighting>, Fault> {
-        const WRONG: Fault =
-            Fault::new("the tracker needs whole HSI pictures: wire it to the output \"hsi\" of a camera");
-        if picture.encoding != Encoding::Hsi8 || row.len() != picture.len() || row.is_empty() {
+        const WRONG: Fault = Fault::new(
+            "the tracker needs whole pictures: RGB at \"rgb\", or those of the output \"hsi\" of a camera",
+        );
+        if row.len() != picture.len() || row.is_empty() {
             return Err(WRONG);
         }
         let size = Size::new(picture.width as usize, picture.height as usize);
         self.fit(size);
-        in_range(row, &params.colours(), &mut self.mask).map_err(|_| WRONG)?;
+        let range = params.colours();
+        match picture.encoding {
+            Encoding::Hsi8 => in_range(row, &range, &mut self.mask),
+            Encoding::Rgb8 => self.colours.get_or_insert_default().split(row, &range, &mut self.mask),
+            _ => return Err(WRONG),
+        }
+        .map_err(|_| WRONG)?;
         let Some(finder) = &mut self.finder else { return Ok(None) };
         let Some(blob) = finder.largest(&self.mask).map_err(|_| WRONG)? else { return Ok(None) };
         let camera = Camera { size, horizontal_field_of_view: picture.field_of_view.into() };
@@ -261,7 +280,22 @@ mod tests {
         assert!(see(14..18).unwrap().bearing.abs() < 1e-9);
         assert_eq!(see(0..0), None);
         let (image, row) = picture(0..4);
-        assert!(eye.see(&params, &Image { encoding: Encoding::Rgb8, ..image }, &row).is_err());
+        assert!(eye.see(&params, &Image { encoding: Encoding::Mono8, ..image }, &row[..768]).is_err());
+    }
+
+    #[test]
+    fn a_picture_and_its_conversion_give_the_same_sighting() {
+        let params = TrackerParams::default();
+        let image = Image { encoding: Encoding::Rgb8, ..picture(0..0).0 };
+        let pixel = |i: usize| if (3..9).contains(&(i % 32)) { [200, 25, 20] } else { [120, 110, 100] };
+        let rgb: Vec<u8> = (0..32 * 24).flat_map(pixel).collect();
+        let mut hsi = vec![0; rgb.len()];
+        Converter::new().convert(&rgb, &mut hsi).unwrap();
+        let mut eye = Eye::default();
+        let seen = eye.see(&params, &image, &rgb).unwrap().unwrap();
+        assert!((seen.share - 6.0 / 32.0).abs() < 1e-12, "{seen:?}");
+        let converted = eye.see(&params, &Image { encoding: Encoding::Hsi8, ..image }, &hsi).unwrap();
+        assert_eq!(converted, Some(seen));
     }
 
     fn at(millis: i64) -> Time {
