@@ -57,13 +57,15 @@ pub struct Camera {
     /// What has changed since the picture before.
     motion: Output<PictureMotion>,
     params: CameraParams,
-    converter: Converter,
+    /// Made when the agent starts: its tables take some milliseconds, which nobody shall spend who only asks for the ports.
+    converter: Option<Converter>,
     darkroom: Darkroom,
 }
 
 impl Agent for Camera {
     fn start(&mut self, _: &mut Step) -> Result<(), Fault> {
         self.darkroom.fit(BYTES_MAX / 3);
+        self.converter.get_or_insert_default();
         Ok(())
     }
 
@@ -87,10 +89,12 @@ impl Agent for Camera {
             });
         }
         let mut done = Ok(());
-        if self.hsi.has_listeners() {
+        if let Some(converter) = &self.converter
+            && self.hsi.has_listeners()
+        {
             self.hsi.fill_as(envelope, |head, room| {
                 *head = Image { encoding: Encoding::Hsi8, ..image };
-                done = self.converter.convert(row, &mut room[..row.len()]);
+                done = converter.convert(row, &mut room[..row.len()]);
                 row.len()
             });
         }
