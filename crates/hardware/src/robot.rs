@@ -46,12 +46,17 @@ pub struct RobotParams {
 
 /// The place where a gate waits for its agent, and where it comes back to when the agent ends. Clones are the same place.
 #[derive(Clone, Default)]
-pub struct Berth(Arc<Mutex<Option<Gate>>>);
+pub struct Berth {
+    place: Arc<Mutex<Option<Gate>>>,
+    /// Bytes of a picture of this robot, known also while the gate is with an agent.
+    picture: usize,
+}
 
 impl Berth {
     /// A place with a gate in it.
     pub fn with(gate: Gate) -> Berth {
-        Berth(Arc::new(Mutex::new(Some(gate))))
+        let picture = gate.description().picture;
+        Berth { place: Arc::new(Mutex::new(Some(gate))), picture }
     }
 
     /// The agent type of the robot behind this gate, under the name `kind` in plans.
@@ -62,16 +67,16 @@ impl Berth {
 
     /// Whether the gate is here, and not with an agent.
     pub fn is_taken(&self) -> bool {
-        self.0.try_lock().is_ok_and(|gate| gate.is_some())
+        self.place.try_lock().is_ok_and(|gate| gate.is_some())
     }
 
     /// The gate, if it is here. Nobody is waited for.
     fn take(&self) -> Option<Gate> {
-        self.0.try_lock().ok()?.take()
+        self.place.try_lock().ok()?.take()
     }
 
     fn put(&self, gate: Gate) {
-        if let Ok(mut place) = self.0.lock() {
+        if let Ok(mut place) = self.place.lock() {
             *place = Some(gate);
         }
     }
@@ -90,8 +95,8 @@ pub struct Robot {
     /// Scans of the laser.
     #[port(rows = 4096)]
     scan: Output<LaserScan>,
-    /// Pictures of the camera.
-    #[port(rows = 320 * 240 * 3)]
+    /// Pictures of the camera. There is room for those that the robot's own camera takes.
+    #[port(rows = self.berth.picture)]
     image: Output<Image>,
     /// Counts of the wheels.
     ticks: Output<WheelTicks>,
