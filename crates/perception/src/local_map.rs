@@ -75,25 +75,32 @@ impl Default for MapParams {
 /// Cells in a map.
 const CELLS: usize = (SIDE * SIDE) as usize;
 
-/// A cell of the floor. The map is a torus: `tile` says which of the many places that share this memory it speaks of.
-#[derive(Clone, Copy, Debug, Default)]
-struct Cell {
-    tile: (i8, i8),
-    evidence: i8,
-}
+/// Which of the many places that share the memory of a cell it speaks of: the map is a torus. The low byte counts across, the high one
+/// along.
+type Tile = u16;
 
 /// The surroundings of a robot in the frame of its odometry.
 #[derive(Clone, Debug)]
 pub struct LocalMap {
     params: MapParams,
-    cells: Box<[Cell; CELLS]>,
-    /// When each was heard last, in ticks; apart from the cells, since most of what is done to a cell does not need it.
+    /// What is known of a cell, each in a row of its own: most of what is done to a cell needs one or two of them, and rows of small
+    /// numbers are compared many at a time.
+    evidence: Box<[i8; CELLS]>,
+    tiles: Box<[Tile; CELLS]>,
+    /// When it was heard last, in ticks.
     heard: Box<[i32; CELLS]>,
     /// A bit for each cell, a word for each row of the memory: set where the evidence is above zero. Few cells are occupied, and
     /// looking for them in words spares looking at all the others.
     occupied: Box<[Row; SIDE as usize]>,
+    /// The same for what is surely occupied.
+    sure: Box<[Row; SIDE as usize]>,
     arcs: Arcs,
 }
+
+/// Squares of two cells by two beside each other, at most.
+const SQUARES: usize = SIDE as usize / 2;
+/// In place of the evidence where there never was any.
+const UNKNOWN: i8 = i8::MIN;
 
 /// The bits of a row: as many as a map has cells on a side.
 type Row = u128;
@@ -110,9 +117,11 @@ impl LocalMap {
     pub fn new(params: MapParams) -> LocalMap {
         LocalMap {
             params,
-            cells: Box::new([Cell::default(); CELLS]),
+            evidence: Box::new([0; CELLS]),
+            tiles: Box::new([0; CELLS]),
             heard: Box::new([0; CELLS]),
             occupied: Box::new([0; SIDE as usize]),
+            sure: Box::new([0; SIDE as usize]),
             arcs: Arcs::new(ARC * params.cone),
         }
     }
@@ -127,8 +136,10 @@ impl LocalMap {
 
     /// Forgets everything.
     pub fn reset(&mut self) {
-        self.cells.fill(Cell::default());
+        self.evidence.fill(0);
+        self.tiles.fill(0);
         self.occupied.fill(0);
+        self.sure.fill(0);
     }
 
     /// Takes over a reading that was made at `pose`: bearing (rad) and distance from the robot's centre (m) of each echo. Directions
@@ -160,12 +171,10 @@ impl LocalMap {
         let oldest = ticks(now).saturating_sub(ticks(Time::ZERO + self.params.keep));
         let (s, c) = (sin(pose.heading), cos(pose.heading));
         (y - span..=y + span)
-            .flat_map(move |iy| self.occupied_in(iy, x - span, 2 * span + 1).map(move |ix| (ix, iy)))
+            .flat_map(move |iy| columns(&self.occupied, iy, x - span, 2 * span + 1).map(move |ix| (ix, iy)))
             .filter(move |&(ix, iy)| {
                 let at = slot(ix, iy);
-                self.cells[at].evidence >= least
-                    && self.heard[at] >= oldest
-                    && self.cells[at].tile == tile(ix, iy)
+                self.evidence[at] >= least && self.heard[at] >= oldest && self.tiles[at] == tile(ix, iy)
             })
             .map(move |(ix, iy)| {
                 let off = middle(ix, iy) - pose.position();
@@ -174,40 +183,47 @@ impl LocalMap {
             .filter(move |point| is_within(*point, reach))
     }
 
-    /// The columns with evidence above zero in row `iy`, of `count` (less than the side) from column `first` on.
-    fn occupied_in(&self, iy: i32, first: i32, count: i32) -> Columns {
-        let row = self.occupied[iy.rem_euclid(SIDE) as usize];
-        let wanted = (1 << count) - 1;
-        Columns { left: row.rotate_right(first.rem_euclid(SIDE) as u32) & wanted, first }
-    }
-
     /// What is known within `reach` (m) of a place on squares of two cells by two: the middle of each, and whether something is surely in it, or
     /// surely nothing. Squares of which nothing was ever known are left out.
     pub fn squares(&self, place: Point, reach: f64) -> impl Iterator<Item = (Point, Option<bool>)> + '_ {
         let reach = reach.clamp(0.0, f64::from(SIDE / 2 - 2) * CELL);
         let half = |i: i32| i.div_euclid(2);
         let ((x, y), span) = (index(place), whole(reach / (2.0 * CELL)));
-        (half(y) - span..=half(y) + span)
-            .flat_map(move |iy| (half(x) - span..=half(x) + span).map(move |ix| (2 * ix, 2 * iy)))
-            .filter_map(move |(ix, iy)| {
-                let four = [(0, 0), (1, 0), (0, 1), (1, 1)].map(|(dx, dy)| (ix + dx, iy + dy));
-                let known = four.into_iter().filter_map(|(x, y)| {
-                    let cell = &self.cells[slot(x, y)];
-                    (cell.tile == tile(x, y) && cell.evidence != 0).then_some(cell.evidence)
-                });
-                let most = known.max()?;
-                let middle = Point::new(f64::from(ix + 1) * CELL, f64::from(iy + 1) * CELL);
-                Some((
-                    middle,
-                    if most >= SURE {
-                        Some(true)
-                    } else if most < 0 {
-                        Some(false)
-                    } else {
-                        None
-                    },
-                ))
+        let (first, count) = (half(x) - span, 2 * span as usize + 1);
+        (half(y) - span..=half(y) + span).flat_map(move |iy| {
+            let row = self.row_of_squares(2 * first, 2 * iy, count);
+            (0..count).filter(move |k| row[*k] != UNKNOWN).map(move |k| {
+                let ix = first + k as i32;
+                let middle = Point::new(f64::from(2 * ix + 1) * CELL, f64::from(2 * iy + 1) * CELL);
+                let taken = if row[k] >= SURE { Some(true) } else { (row[k] < 0).then_some(false) };
+                (middle, taken)
             })
+        })
+    }
+
+    /// The most evidence in each of `count` squares of two cells by two, from the square with its lowest cell at (`x`, `y`) on; both are even.
+    fn row_of_squares(&self, x: i32, y: i32, count: usize) -> [i8; SQUARES] {
+        let mut most = [UNKNOWN; SQUARES];
+        let mut done = 0;
+        // Where the row crosses the rim of the memory it goes on at the other side, with another tile.
+        while done < count {
+            let x = x + 2 * done as i32;
+            let here = (count - done).min((SIDE - x.rem_euclid(SIDE)) as usize / 2);
+            for y in [y, y + 1] {
+                let (from, tile) = (slot(x, y), tile(x, y));
+                let cells = from..from + 2 * here;
+                let pairs =
+                    self.evidence[cells.clone()].chunks_exact(2).zip(self.tiles[cells].chunks_exact(2));
+                for (most, (evidence, tiles)) in most[done..done + here].iter_mut().zip(pairs) {
+                    let known = |k: usize| {
+                        if tiles[k] == tile && evidence[k] != 0 { evidence[k] } else { UNKNOWN }
+                    };
+                    *most = (*most).max(known(0)).max(known(1));
+                }
+            }
+            done += here;
+        }
+        most
     }
 
     /// Less evidence for what is nearer than an echo at `range` (m) from the sensor.
@@ -218,7 +234,7 @@ impl LocalMap {
             return;
         }
         let widest = INSIDE * self.params.cone;
-        let mut shadow = [false; SHADES];
+        let (mut shadow, mut shaded) = ([false; SHADES], false);
         let shade = |across: f64| ((across / widest + 1.0) * 0.5 * (SHADES - 1) as f64) as usize;
         let mut away = CELL / 2.0;
         while away < free {
@@ -228,17 +244,23 @@ impl LocalMap {
             let mut walk = Walk::new(sensor.point(away, 0.0), sensor.left() * CELL, steps);
             for step in -steps..=steps {
                 let (ix, iy) = walk.next().unwrap_or_else(|| index(point(step)));
+                // Of most cells in a cone it is known already, and there nothing changes, in a shadow or not.
+                let at = slot(ix, iy);
+                if self.evidence[at] == EVIDENCE.0 && self.tiles[at] == tile(ix, iy) {
+                    continue;
+                }
                 let off = f64::from(step) * CELL;
-                if shadow[shade(off / away).min(SHADES - 1)] {
+                if shaded && shadow[shade(off / away).min(SHADES - 1)] {
                     continue;
                 }
                 let at = self.slot_for(ix, iy);
-                if self.cells[at].evidence >= SURE && self.is_met_obliquely(ix, iy, sensor) {
+                if self.evidence[at] >= SURE && self.is_met_obliquely(ix, iy, sensor) {
                     let (from, to) = (shade((off - CELL / 2.0) / away), shade((off + CELL / 2.0) / away));
                     shadow[from.min(SHADES - 1)..=to.min(SHADES - 1)].fill(true);
+                    shaded = true;
                     continue;
                 }
-                self.set_evidence(at, (self.cells[at].evidence - loss).max(EVIDENCE.0));
+                self.set_evidence(at, (self.evidence[at] - loss).max(EVIDENCE.0));
             }
             away += CELL;
         }
@@ -248,10 +270,9 @@ impl LocalMap {
     fn is_met_obliquely(&self, x: i32, y: i32, sensor: Sensor) -> bool {
         let (mut n, mut sum, mut xx, mut xy, mut yy) = (0.0, Point::default(), 0.0, 0.0, 0.0);
         for dy in -FACE..=FACE {
-            for dx in -FACE..=FACE {
-                let cell = &self.cells[slot(x + dx, y + dy)];
-                if cell.evidence >= SURE && cell.tile == tile(x + dx, y + dy) {
-                    let at = Point::new(f64::from(dx), f64::from(dy));
+            for ix in columns(&self.sure, y + dy, x - FACE, 2 * FACE + 1) {
+                if self.tiles[slot(ix, y + dy)] == tile(ix, y + dy) {
+                    let at = Point::new(f64::from(ix - x), f64::from(dy));
                     n += 1.0;
                     sum = sum + at;
                     (xx, xy, yy) = (xx + at.x * at.x, xy + at.x * at.y, yy + at.y * at.y);
@@ -298,7 +319,7 @@ impl LocalMap {
         };
         for step in -steps..=steps {
             let at = self.slot_of(sensor.turned(range, self.arcs.way(step, steps)));
-            self.set_evidence(at, (self.cells[at].evidence + gain).min(EVIDENCE.1));
+            self.set_evidence(at, (self.evidence[at] + gain).min(EVIDENCE.1));
             self.heard[at] = tick;
         }
     }
@@ -311,7 +332,7 @@ impl LocalMap {
             let mut away = between.0;
             while away <= between.1 {
                 let at = self.slot_of(sensor.turned(away, way));
-                surest = surest.max(self.cells[at].evidence);
+                surest = surest.max(self.evidence[at]);
                 away += CELL;
             }
         }
@@ -325,7 +346,7 @@ impl LocalMap {
             let mut away = between.0;
             while away <= between.1 {
                 let at = self.slot_of(sensor.turned(away, way));
-                let evidence = self.cells[at].evidence;
+                let evidence = self.evidence[at];
                 if evidence >= least {
                     self.heard[at] = tick;
                     self.set_evidence(at, (evidence + 1).min(EVIDENCE.1));
@@ -361,9 +382,9 @@ impl LocalMap {
     #[inline]
     fn slot_for(&mut self, ix: i32, iy: i32) -> usize {
         let at = slot(ix, iy);
-        if self.cells[at].tile != tile(ix, iy) {
+        if self.tiles[at] != tile(ix, iy) {
             self.set_evidence(at, 0);
-            self.cells[at].tile = tile(ix, iy);
+            self.tiles[at] = tile(ix, iy);
             self.heard[at] = 0;
         }
         at
@@ -371,12 +392,23 @@ impl LocalMap {
 
     #[inline]
     fn set_evidence(&mut self, at: usize, evidence: i8) {
-        let was = core::mem::replace(&mut self.cells[at].evidence, evidence);
-        // The bit changes far less often than the evidence.
+        let was = core::mem::replace(&mut self.evidence[at], evidence);
+        let (row, bit) = (at / SIDE as usize, 1 << (at % SIDE as usize));
+        // The bits change far less often than the evidence.
         if (was > 0) != (evidence > 0) {
-            self.occupied[at / SIDE as usize] ^= 1 << (at % SIDE as usize);
+            self.occupied[row] ^= bit;
+        }
+        if (was >= SURE) != (evidence >= SURE) {
+            self.sure[row] ^= bit;
         }
     }
+}
+
+/// The columns of the set bits in row `iy`, of `count` (less than the side) from column `first` on.
+fn columns(rows: &[Row; SIDE as usize], iy: i32, first: i32, count: i32) -> Columns {
+    let row = rows[iy.rem_euclid(SIDE) as usize];
+    let wanted = (1 << count) - 1;
+    Columns { left: row.rotate_right(first.rem_euclid(SIDE) as u32) & wanted, first }
 }
 
 /// The columns of the set bits of a row, from `first` on.
@@ -550,12 +582,17 @@ fn middle(ix: i32, iy: i32) -> Point {
     Point::new((f64::from(ix) + 0.5) * CELL, (f64::from(iy) + 0.5) * CELL)
 }
 
+#[inline]
 fn slot(ix: i32, iy: i32) -> usize {
     (iy.rem_euclid(SIDE) * SIDE + ix.rem_euclid(SIDE)) as usize
 }
 
-fn tile(ix: i32, iy: i32) -> (i8, i8) {
-    (ix.div_euclid(SIDE) as i8, iy.div_euclid(SIDE) as i8)
+#[inline]
+fn tile(ix: i32, iy: i32) -> Tile {
+    // A shift rounds down, as is meant here; a division would round towards zero.
+    const SHIFT: u32 = SIDE.trailing_zeros();
+    const { assert!(1 << SHIFT == SIDE) };
+    Tile::from_le_bytes([(ix >> SHIFT) as u8, (iy >> SHIFT) as u8])
 }
 
 #[cfg(test)]
@@ -681,8 +718,8 @@ mod tests {
         let oldest = ticks(now) - ticks(Time::ZERO + map.params.keep);
         let cells = (y - span..=y + span).flat_map(|iy| (x - span..=x + span).map(move |ix| (ix, iy)));
         let occupied = cells.filter(|&(ix, iy)| {
-            let cell = map.cells[slot(ix, iy)];
-            cell.evidence > 0 && map.heard[slot(ix, iy)] >= oldest && cell.tile == tile(ix, iy)
+            let at = slot(ix, iy);
+            map.evidence[at] > 0 && map.heard[at] >= oldest && map.tiles[at] == tile(ix, iy)
         });
         let (s, c) = (sin(pose.heading), cos(pose.heading));
         occupied
@@ -690,6 +727,23 @@ mod tests {
             .map(|off| Point::new(c * off.x + s * off.y, c * off.y - s * off.x))
             .filter(|point| point.norm() <= reach)
             .collect()
+    }
+
+    /// What [`LocalMap::squares`] is to give, cell by cell.
+    fn squares_by_hand(map: &LocalMap, place: Point, reach: f64) -> Vec<(Point, Option<bool>)> {
+        let ((x, y), span) = (index(place), (reach.min(62.0 * CELL) / (2.0 * CELL)).floor() as i32);
+        let low = |i: i32| 2 * i.div_euclid(2);
+        let corners = (-span..=span).flat_map(|dy| (-span..=span).map(move |dx| (dx, dy)));
+        let squares = corners.filter_map(|(dx, dy)| {
+            let (ix, iy) = (low(x) + 2 * dx, low(y) + 2 * dy);
+            let four = [(0, 0), (1, 0), (0, 1), (1, 1)].map(|(dx, dy)| (ix + dx, iy + dy));
+            let known = four.into_iter().filter(|&(x, y)| map.tiles[slot(x, y)] == tile(x, y));
+            let most =
+                known.map(|(x, y)| map.evidence[slot(x, y)]).filter(|evidence| *evidence != 0).max()?;
+            let middle = Point::new(f64::from(ix + 1) * CELL, f64::from(iy + 1) * CELL);
+            Some((middle, if most >= SURE { Some(true) } else { (most < 0).then_some(false) }))
+        });
+        squares.collect()
     }
 
     proptest! {
@@ -710,6 +764,8 @@ mod tests {
             let reach = reach.min(3.15);
             let found: Vec<Point> = map.around(pose, reach, now, 1).collect();
             prop_assert_eq!(found, around_by_hand(&map, pose, reach, now));
+            let found: Vec<_> = map.squares(pose.position(), reach).collect();
+            prop_assert_eq!(found, squares_by_hand(&map, pose.position(), reach));
         }
 
         #[test]
