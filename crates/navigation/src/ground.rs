@@ -11,8 +11,8 @@
 
 use crate::layer::{Layer, SIDE};
 use crate::search::{Floor, Search};
-use libm::floor;
 use types::Point;
+use types::geometry::whole;
 
 /// Side of a cell (m).
 pub const CELL: f64 = 0.1;
@@ -175,7 +175,7 @@ impl Ground {
 
     /// Whether nothing stands between two points.
     fn is_seen(&self, from: Point, to: Point) -> bool {
-        let steps = floor(from.distance(to) / CELL) as i32;
+        let steps = whole(from.distance(to) / CELL);
         (1..steps).all(|i| {
             let at = from + (to - from) * (f64::from(i) / f64::from(steps));
             self.cell(at).is_none_or(|cell| !self.taken.get(cell))
@@ -261,7 +261,7 @@ impl Ground {
         let corner = self.corner;
         (y - span..=y + span)
             .flat_map(move |iy| (x - span..=x + span).map(move |ix| (ix, iy)))
-            .filter(move |&(ix, iy)| centre(ix, iy).distance(middle) <= radius)
+            .filter(move |&(ix, iy)| (centre(ix, iy) - middle).is_within(radius))
             .filter_map(move |(ix, iy)| slot(corner, ix, iy))
     }
 
@@ -280,7 +280,7 @@ impl Ground {
 }
 
 fn index(point: Point) -> (i32, i32) {
-    (floor(point.x / CELL) as i32, floor(point.y / CELL) as i32)
+    (whole(point.x / CELL), whole(point.y / CELL))
 }
 
 fn centre(ix: i32, iy: i32) -> Point {

@@ -11,11 +11,11 @@ type Row = [u64; WORDS];
 
 /// A bit for each cell; a cell is its row times [`SIDE`] plus its column.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub(crate) struct Layer(Box<[Row]>);
+pub(crate) struct Layer(Box<[Row; SIDE]>);
 
 impl Default for Layer {
     fn default() -> Layer {
-        Layer(vec![[0; WORDS]; SIDE].into_boxed_slice())
+        Layer(Box::new([[0; WORDS]; SIDE]))
     }
 }
 
@@ -27,9 +27,8 @@ impl Layer {
 
     pub(crate) fn set(&mut self, cell: usize, to: bool) {
         let (row, column) = (cell / SIDE, cell % SIDE);
-        let bit = 1 << (column % 64);
         let word = &mut self.0[row][column / 64];
-        *word = if to { *word | bit } else { *word & !bit };
+        *word = *word & !(1 << (column % 64)) | u64::from(to) << (column % 64);
     }
 
     pub(crate) fn is_empty(&self) -> bool {
@@ -45,7 +44,7 @@ impl Layer {
     }
 
     pub(crate) fn clear_column(&mut self, column: usize) {
-        for row in &mut self.0 {
+        for row in self.0.iter_mut() {
             row[column / 64] &= !(1 << (column % 64));
         }
     }
@@ -61,14 +60,14 @@ impl Layer {
 
     /// Into `self` what is in one or the other.
     pub(crate) fn unite(&mut self, one: &Layer, other: &Layer) {
-        for ((out, one), other) in self.0.iter_mut().zip(&one.0).zip(&other.0) {
+        for ((out, one), other) in self.0.iter_mut().zip(one.0.iter()).zip(other.0.iter()) {
             *out = either(*one, *other);
         }
     }
 
     /// Into `self` what is in `one` and not in `other`.
     pub(crate) fn difference(&mut self, one: &Layer, other: &Layer) {
-        for ((out, one), other) in self.0.iter_mut().zip(&one.0).zip(&other.0) {
+        for ((out, one), other) in self.0.iter_mut().zip(one.0.iter()).zip(other.0.iter()) {
             *out = std::array::from_fn(|i| one[i] & !other[i]);
         }
     }

@@ -18,6 +18,7 @@
 //! and Elfes 1985. One echo one cause: the "mutual exclusion" of Konolige 1997.)
 
 use libm::{cos, sin};
+use types::geometry::whole;
 use types::{Duration, Point, Pose, Time};
 
 /// Side of a cell (m). Half the reach of what two readings of one thing differ by, at 1 m.
@@ -180,7 +181,7 @@ impl LocalMap {
                 let off = middle(ix, iy) - pose.position();
                 Point::new(c * off.x + s * off.y, c * off.y - s * off.x)
             })
-            .filter(move |point| is_within(*point, reach))
+            .filter(move |point| point.is_within(reach))
     }
 
     /// What is known within `reach` (m) of a place on squares of two cells by two: the middle of each, and whether something is surely in it, or
@@ -363,7 +364,7 @@ impl LocalMap {
         for iy in y - span..=y + span {
             for ix in x - span..=x + span {
                 let middle = middle(ix, iy);
-                if is_within(middle - pose.position(), inner) {
+                if (middle - pose.position()).is_within(inner) {
                     let at = self.slot_of(middle);
                     self.set_evidence(at, EVIDENCE.0);
                 }
@@ -563,21 +564,6 @@ fn index(point: Point) -> (i32, i32) {
     (whole(point.x / CELL), whole(point.y / CELL))
 }
 
-/// The greatest whole number that is not above `x`: what rounding down and a conversion give, in fewer instructions.
-#[inline]
-fn whole(x: f64) -> i32 {
-    let cut = x as i32;
-    cut.saturating_sub(i32::from(f64::from(cut) > x))
-}
-
-/// Whether the vector is at most as long as `reach` (m, not negative). The length itself is dear and seldom needed to tell that.
-#[inline]
-fn is_within(off: Point, reach: f64) -> bool {
-    let (square, most) = (off.dot(off), reach * reach);
-    let sure = 1e-12 * most;
-    if (square - most).abs() > sure { square < most } else { off.norm() <= reach }
-}
-
 fn middle(ix: i32, iy: i32) -> Point {
     Point::new((f64::from(ix) + 0.5) * CELL, (f64::from(iy) + 0.5) * CELL)
 }
@@ -766,20 +752,6 @@ mod tests {
             prop_assert_eq!(found, around_by_hand(&map, pose, reach, now));
             let found: Vec<_> = map.squares(pose.position(), reach).collect();
             prop_assert_eq!(found, squares_by_hand(&map, pose.position(), reach));
-        }
-
-        #[test]
-        fn the_short_way_to_round_down_is_rounding_down(x in any::<f64>(), near in -1000i32..1000) {
-            for x in [x, f64::from(near) / 7.0, f64::from(near), f64::from(near).next_down(), f64::from(near).next_up(), -0.0] {
-                prop_assert_eq!(whole(x), libm::floor(x) as i32);
-            }
-        }
-
-        #[test]
-        fn the_short_way_to_compare_a_length_is_to_compare_it(angle in -4f64..4.0, reach in 0f64..4.0, off in -4i64..4) {
-            // As near to the reach as numbers can be.
-            let point = Point::polar(f64::from_bits((reach.to_bits() as i64 + off).max(0) as u64), angle);
-            prop_assert_eq!(is_within(point, reach), point.norm() <= reach);
         }
     }
 

@@ -40,6 +40,13 @@ pub fn wrap(angle: f64) -> f64 {
     if wrapped >= PI { wrapped - TAU } else { wrapped }
 }
 
+/// The greatest whole number that is not above `x`: what rounding down and a conversion give, in fewer instructions.
+#[inline]
+pub fn whole(x: f64) -> i32 {
+    let cut = x as i32;
+    cut.saturating_sub(i32::from(f64::from(cut) > x))
+}
+
 impl Point {
     /// The point (x, y).
     pub const fn new(x: f64, y: f64) -> Point {
@@ -55,6 +62,14 @@ impl Point {
     /// Length of the vector (m).
     pub fn norm(self) -> f64 {
         hypot(self.x, self.y)
+    }
+
+    /// Whether the vector is at most as long as `reach` (m, not negative). The length itself is dear and seldom needed to tell that.
+    #[inline]
+    pub fn is_within(self, reach: f64) -> bool {
+        let (square, most) = (self.dot(self), reach * reach);
+        let sure = 1e-12 * most;
+        if libm::fabs(square - most) > sure { square < most } else { self.norm() <= reach }
     }
 
     /// Direction of the vector (rad).
@@ -171,6 +186,20 @@ mod tests {
             for angle in [angle, angle * 1e-6, libm::ldexp(angle * 1e-6, exponent)] {
                 proptest::prop_assert_eq!(sincos(angle), (sin(angle), cos(angle)));
             }
+        }
+
+        #[test]
+        fn the_short_way_to_round_down_is_rounding_down(x in proptest::num::f64::ANY, near in -1000i32..1000) {
+            for x in [x, f64::from(near) / 7.0, f64::from(near), f64::from(near).next_down(), f64::from(near).next_up(), -0.0] {
+                proptest::prop_assert_eq!(whole(x), floor(x) as i32);
+            }
+        }
+
+        #[test]
+        fn the_short_way_to_compare_a_length_is_to_compare_it(angle in -4f64..4.0, reach in 0f64..4.0, off in -4i64..4) {
+            // As near to the reach as numbers can be.
+            let point = Point::polar(f64::from_bits((reach.to_bits() as i64 + off).max(0) as u64), angle);
+            proptest::prop_assert_eq!(point.is_within(reach), point.norm() <= reach);
         }
 
         #[test]
