@@ -37,38 +37,38 @@ impl Mean {
     }
 }
 
-/// The words on one axis: a set for each sign for Mamdani, a mean for Sugeno.
+/// The words on one axis: a set for each sign for Mamdani, a mean for Sugeno. Most offers are in numbers, and the sets are large: there
+/// is none before the first word.
+#[derive(Default)]
 pub(super) struct Words {
-    positive: Set,
-    negative: Set,
+    positive: Option<Set>,
+    negative: Option<Set>,
     singletons: Mean,
     /// The largest weight of a word.
     pub(super) weight: f64,
 }
 
-impl Default for Words {
-    fn default() -> Words {
-        Words { positive: Set::EMPTY, negative: Set::EMPTY, singletons: Mean::default(), weight: 0.0 }
-    }
-}
-
 impl Words {
     pub(super) fn add(&mut self, claim: Claim, sign: f64, weight: f64) {
         let set = if sign > 0.0 { &mut self.positive } else { &mut self.negative };
-        set.add(claim, fmin(weight, 1.0));
+        set.get_or_insert(Set::EMPTY).add(claim, fmin(weight, 1.0));
         self.singletons.add(sign * claim.term.centre(), weight);
         self.weight = fmax(self.weight, weight);
     }
 
     pub(super) fn value(&self, inference: Inference) -> Option<f64> {
-        // A word without weight is not heard, so without weight there is no word: the common case, and the sets are large.
+        // A word without weight is not heard, so without weight there is no word.
         if self.weight == 0.0 {
             return None;
         }
         match inference {
             Inference::Sugeno => self.singletons.value(),
             // Claims of the negative side were made on its mirror image.
-            Inference::Mamdani => fuzzy::centroid_of_two_sides(&self.positive, &self.negative),
+            Inference::Mamdani => {
+                let [positive, negative] =
+                    [&self.positive, &self.negative].map(|set| set.as_ref().unwrap_or(const { &Set::EMPTY }));
+                fuzzy::centroid_of_two_sides(positive, negative)
+            }
         }
     }
 }
