@@ -3,7 +3,7 @@
 //! It runs when ranges come, and once more when they stay away: then it is blind, and says so.
 
 use motion::ring::Ring;
-use motion::safety::{Parameters, Verdict, judge, judge_one};
+use motion::safety::{Parameters, Verdict, Way, judge, judge_way};
 use perception::local_map::{LocalMap, MapParams};
 use runtime::{Agent, Fault, Input, Output, Step};
 use types::geometry::{PI, wrap};
@@ -152,7 +152,7 @@ const BESIDE: f64 = 0.6 * PI;
 const TURNING: f64 = 0.2;
 
 /// What was heard last, and the side on which the robot turns away.
-#[derive(Debug, Default)]
+#[derive(Debug)]
 struct Watch {
     filtered: Option<Dated<Ranges>>,
     raw: Option<Dated<Ranges>>,
@@ -161,12 +161,31 @@ struct Watch {
     pose: Option<Pose>,
     heard_at: Option<Pose>,
     map: LocalMap,
+    /// Bearing (rad) and distance (m) of what is looked at. Its memory is taken when the agent is made, so no step takes any.
+    points: Vec<(f64, f64)>,
     /// The stamp of the ranges that were put into the map last.
     mapped: Option<Time>,
     /// 1 for left, −1 for right; 0 while nothing is to be avoided.
     side: f64,
     /// Whether that was said already.
     blind: bool,
+}
+
+impl Default for Watch {
+    fn default() -> Watch {
+        Watch {
+            filtered: None,
+            raw: None,
+            motion: Twist::ZERO,
+            pose: None,
+            heard_at: None,
+            map: LocalMap::default(),
+            points: Vec::with_capacity(POINTS),
+            mapped: None,
+            side: 0.0,
+            blind: false,
+        }
+    }
 }
 
 impl Watch {
@@ -203,7 +222,7 @@ impl Watch {
     }
 
     /// What it remembers counts as well as what it hears: there it is known where in its cone an echo came from.
-    fn remembered(&mut self, params: &SafetyParams, filtered: &Ranges, stamp: Time) -> Option<Verdict> {
+    fn remembered(&mut self, params: &SafetyParams, filtered: &Ranges, stamp: Time) -> Option<Way> {
         let pose = self.pose?;
         if self.mapped != Some(stamp) {
             self.map.set_params(MapParams {
@@ -215,15 +234,10 @@ impl Watch {
             self.map.update(echoes(filtered), self.heard_at.unwrap_or(pose), stamp);
             self.mapped = Some(stamp);
         }
-        let mut room = [(0.0, 0.0); POINTS];
-        let mut len = 0;
-        let points = self.map.around(pose, params.radius + params.horizon, stamp, 1);
-        for (out, point) in room.iter_mut().zip(points) {
-            *out = (point.bearing(), point.norm());
-            len += 1;
-        }
-        let points = Ring::Beams(&room[..len]);
-        (len > 0).then(|| judge_one(&params.law(), points, self.motion))
+        let points = self.map.around(pose, params.radius + params.horizon, stamp, 1).take(POINTS);
+        self.points.clear();
+        self.points.extend(points.map(|point| (point.bearing(), point.norm())));
+        (!self.points.is_empty()).then(|| judge_way(&params.law(), Ring::Beams(&self.points), self.motion))
     }
 
     /// With something beside it as near as can be told it creeps; with that in front it may be nearer than told, and it stands.

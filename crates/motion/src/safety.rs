@@ -94,22 +94,50 @@ pub fn speed_to_stop_within(way: f64, reaction: f64, deceleration: f64) -> f64 {
 pub fn judge(parameters: &Parameters, raw: Ring<'_>, filtered: Ring<'_>, present: Twist) -> Verdict {
     let present = if crate::kinematics::is_finite(present) { present } else { Twist::ZERO };
     let ways = (ahead(parameters, raw, present), ahead(parameters, filtered, present));
-    verdict(parameters, (raw, filtered), ways, present)
+    let way = way(parameters, (raw, filtered), ways, present);
+    let (left, right) = (room(parameters, filtered, 1.0), room(parameters, filtered, -1.0));
+    Verdict {
+        forward: way.forward,
+        linear_max: way.linear_max,
+        wider: if left + right > 0.0 { (left - right) / (left + right) } else { 0.0 },
+        danger: way.danger,
+        narrow: is_narrow(parameters, filtered),
+        ahead: way.ahead,
+        nearest: way.nearest,
+        nearest_bearing: way.nearest_bearing,
+    }
 }
 
-/// The same for one ring that is both, at half the price.
-pub fn judge_one(parameters: &Parameters, ring: Ring<'_>, present: Twist) -> Verdict {
+/// What stands in the way, and how fast that lets the robot go: the part of a [`Verdict`] that does not ask how wide it is beside it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Way {
+    /// Whether it may move forward. Turning is always allowed.
+    pub forward: bool,
+    /// Highest forward speed (m/s); 0 while forward is forbidden.
+    pub linear_max: f64,
+    /// From 0, far from everything, to 1, too late to stop in time.
+    pub danger: f64,
+    /// Free way ahead from the body's edge (m); infinite if nothing is there.
+    pub ahead: f64,
+    /// Distance from the body's edge to what is nearest (m).
+    pub nearest: f64,
+    /// Bearing of what is nearest (rad).
+    pub nearest_bearing: f64,
+}
+
+/// The way alone, by one ring that is both: a third of the price where there are many points.
+pub fn judge_way(parameters: &Parameters, ring: Ring<'_>, present: Twist) -> Way {
     let present = if crate::kinematics::is_finite(present) { present } else { Twist::ZERO };
-    let way = ahead(parameters, ring, present);
-    verdict(parameters, (ring, ring), (way, way), present)
+    let free = ahead(parameters, ring, present);
+    way(parameters, (ring, ring), (free, free), present)
 }
 
-fn verdict(
+fn way(
     parameters: &Parameters,
     (raw, filtered): (Ring<'_>, Ring<'_>),
     (heard, believed): (Ahead, Ahead),
     present: Twist,
-) -> Verdict {
+) -> Way {
     let blind = raw.echoes().next().is_none() && filtered.echoes().next().is_none();
     let straight = fmin(heard.straight, believed.straight);
     let curved = fmin(heard.curved, believed.curved);
@@ -125,13 +153,10 @@ fn verdict(
     let share = |needed: f64, way: f64| if way > 0.0 { needed / way } else { 1.0 };
     let in_time = fmax(share(needed + parameters.stop, straight), share(needed, curved));
     let close = 1.0 - nearest / parameters.horizon;
-    let (left, right) = (room(parameters, filtered, 1.0), room(parameters, filtered, -1.0));
-    Verdict {
+    Way {
         forward,
         linear_max: if forward { fmin(safe, parameters.linear_max) } else { 0.0 },
-        wider: if left + right > 0.0 { (left - right) / (left + right) } else { 0.0 },
         danger: if blind { 1.0 } else { fmin(fmax(fmax(in_time, close), 0.0), 1.0) },
-        narrow: is_narrow(parameters, filtered),
         ahead: fmin(straight, curved),
         nearest,
         nearest_bearing,
@@ -377,12 +402,15 @@ mod tests {
         }
 
         #[test]
-        fn one_ring_for_both_is_judged_as_two_that_are_the_same(
+        fn the_way_alone_is_that_of_two_rings_that_are_the_same(
             beams in prop::collection::vec((-3.2f64..3.2, -0.1f64..3.0), 0..30), linear in -0.3f64..0.6, angular in -1f64..1.0
         ) {
             let (parameters, ring) = (Parameters::new(0.225, 0.1, 0.25), Ring::Beams(&beams));
             let present = Twist { linear, angular };
-            prop_assert_eq!(judge_one(&parameters, ring, present), judge(&parameters, ring, ring, present));
+            let Verdict { forward, linear_max, danger, ahead, nearest, nearest_bearing, .. } =
+                judge(&parameters, ring, ring, present);
+            let way = Way { forward, linear_max, danger, ahead, nearest, nearest_bearing };
+            prop_assert_eq!(judge_way(&parameters, ring, present), way);
         }
 
         #[test]
