@@ -292,7 +292,8 @@ fn slot(corner: (i32, i32), ix: i32, iy: i32) -> Option<usize> {
     let side = SIDE as i32;
     let inside = |low: i32, i: i32| (low..low + side).contains(&i);
     (inside(corner.0, ix) && inside(corner.1, iy))
-        .then(|| iy.rem_euclid(side) as usize * SIDE + ix.rem_euclid(side) as usize)
+        // The side is a power of two: its bits are the remainder, of negative numbers too.
+        .then(|| (iy & (side - 1)) as usize * SIDE + (ix & (side - 1)) as usize)
 }
 
 #[cfg(test)]

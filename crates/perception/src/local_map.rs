@@ -21,14 +21,11 @@ use libm::{cos, sin};
 use types::geometry::whole;
 use types::{Duration, Point, Pose, Time};
 
+mod cells;
+use cells::{Cells, EVIDENCE, SIDE, SURE};
+
 /// Side of a cell (m). Half the reach of what two readings of one thing differ by, at 1 m.
 pub const CELL: f64 = 0.05;
-/// Cells on a side of the map; a map is 6.4 m wide and moves with the robot.
-const SIDE: i32 = 128;
-/// Evidence is kept within these: a thing that comes where it was free, or goes, is believed after two or three readings.
-const EVIDENCE: (i8, i8) = (-2, 6);
-/// From this evidence on a cell explains an echo: it was heard from nearby, or often.
-const SURE: i8 = 3;
 /// The part of a cone on which an echo is put, and the part in which it says that nothing is nearer: at the edges of a cone echoes are faint.
 const ARC: f64 = 0.95;
 const INSIDE: f64 = 0.9;
@@ -73,39 +70,18 @@ impl Default for MapParams {
     }
 }
 
-/// Cells in a map.
-const CELLS: usize = (SIDE * SIDE) as usize;
-
-/// Which of the many places that share the memory of a cell it speaks of: the map is a torus. The low byte counts across, the high one
-/// along.
-type Tile = u16;
-
-/// The surroundings of a robot in the frame of its odometry.
+/// The surroundings of a robot in the frame of its odometry: 6.4 m by 6.4 m, which move with it.
 #[derive(Clone, Debug)]
 pub struct LocalMap {
     params: MapParams,
-    /// What is known of a cell, each in a row of its own: most of what is done to a cell needs one or two of them, and rows of small
-    /// numbers are compared many at a time.
-    evidence: Box<[i8; CELLS]>,
-    tiles: Box<[Tile; CELLS]>,
-    /// When it was heard last, in ticks.
-    heard: Box<[i32; CELLS]>,
-    /// A bit for each cell, a word for each row of the memory: set where the evidence is above zero. Few cells are occupied, and
-    /// looking for them in words spares looking at all the others.
-    occupied: Box<[Row; SIDE as usize]>,
-    /// The same for what is surely occupied.
-    sure: Box<[Row; SIDE as usize]>,
+    cells: Cells,
     arcs: Arcs,
+    /// The places of the cells around the arc of an echo. There is room for the widest one, so no reading takes memory.
+    arc: Vec<usize>,
 }
 
-/// Squares of two cells by two beside each other, at most.
-const SQUARES: usize = SIDE as usize / 2;
-/// In place of the evidence where there never was any.
-const UNKNOWN: i8 = i8::MIN;
-
-/// The bits of a row: as many as a map has cells on a side.
-type Row = u128;
-const _: () = assert!(Row::BITS == SIDE as u32);
+/// Cells around an arc: as many as half a turn has at the usual reach, and twice that.
+const ARC_CELLS: usize = 1024;
 
 impl Default for LocalMap {
     fn default() -> LocalMap {
@@ -116,15 +92,8 @@ impl Default for LocalMap {
 impl LocalMap {
     /// A map that knows nothing. The memory for all of it is taken here.
     pub fn new(params: MapParams) -> LocalMap {
-        LocalMap {
-            params,
-            evidence: Box::new([0; CELLS]),
-            tiles: Box::new([0; CELLS]),
-            heard: Box::new([0; CELLS]),
-            occupied: Box::new([0; SIDE as usize]),
-            sure: Box::new([0; SIDE as usize]),
-            arcs: Arcs::new(ARC * params.cone),
-        }
+        let arcs = Arcs::new(ARC * params.cone);
+        LocalMap { params, cells: Cells::new(), arcs, arc: Vec::with_capacity(ARC_CELLS) }
     }
 
     /// Changes the parameters; what was heard is kept.
@@ -137,16 +106,14 @@ impl LocalMap {
 
     /// Forgets everything.
     pub fn reset(&mut self) {
-        self.evidence.fill(0);
-        self.tiles.fill(0);
-        self.occupied.fill(0);
-        self.sure.fill(0);
+        self.cells.clear();
     }
 
     /// Takes over a reading that was made at `pose`: bearing (rad) and distance from the robot's centre (m) of each echo. Directions
     /// without an echo are left out by the caller.
     pub fn update(&mut self, echoes: impl Iterator<Item = (f64, f64)> + Clone, pose: Pose, now: Time) {
         let tick = ticks(now);
+        self.cells.follow(index(pose.position()));
         let heard = echoes.filter(|(bearing, range)| bearing.is_finite() && range.is_finite());
         for (bearing, range) in heard.clone() {
             self.clear_cone(Sensor::new(&self.params, pose, bearing), range - self.params.rim);
@@ -172,10 +139,10 @@ impl LocalMap {
         let oldest = ticks(now).saturating_sub(ticks(Time::ZERO + self.params.keep));
         let (s, c) = (sin(pose.heading), cos(pose.heading));
         (y - span..=y + span)
-            .flat_map(move |iy| columns(&self.occupied, iy, x - span, 2 * span + 1).map(move |ix| (ix, iy)))
+            .flat_map(move |iy| self.cells.occupied_in(iy, x - span, 2 * span + 1).map(move |ix| (ix, iy)))
             .filter(move |&(ix, iy)| {
-                let at = slot(ix, iy);
-                self.evidence[at] >= least && self.heard[at] >= oldest && self.tiles[at] == tile(ix, iy)
+                self.cells.heard(ix, iy) >= oldest
+                    && self.cells.evidence(ix, iy).is_some_and(|evidence| evidence >= least)
             })
             .map(move |(ix, iy)| {
                 let off = middle(ix, iy) - pose.position();
@@ -185,46 +152,19 @@ impl LocalMap {
     }
 
     /// What is known within `reach` (m) of a place on squares of two cells by two: the middle of each, and whether something is surely in it, or
-    /// surely nothing. Squares of which nothing was ever known are left out.
+    /// surely nothing. Squares of which nothing was ever known are left out, and those farther than half the map's width from where the robot was
+    /// at the last reading.
     pub fn squares(&self, place: Point, reach: f64) -> impl Iterator<Item = (Point, Option<bool>)> + '_ {
         let reach = reach.clamp(0.0, f64::from(SIDE / 2 - 2) * CELL);
         let half = |i: i32| i.div_euclid(2);
         let ((x, y), span) = (index(place), whole(reach / (2.0 * CELL)));
-        let (first, count) = (half(x) - span, 2 * span as usize + 1);
-        (half(y) - span..=half(y) + span).flat_map(move |iy| {
-            let row = self.row_of_squares(2 * first, 2 * iy, count);
-            (0..count).filter(move |k| row[*k] != UNKNOWN).map(move |k| {
-                let ix = first + k as i32;
-                let middle = Point::new(f64::from(2 * ix + 1) * CELL, f64::from(2 * iy + 1) * CELL);
-                let taken = if row[k] >= SURE { Some(true) } else { (row[k] < 0).then_some(false) };
-                (middle, taken)
+        let first = 2 * (half(x) - span);
+        (half(y) - span..=half(y) + span).map(|iy| 2 * iy).flat_map(move |iy| {
+            self.cells.squares_in(first, iy, 2 * span + 1).map(move |(column, taken)| {
+                let ix = first + column;
+                (Point::new(f64::from(ix + 1) * CELL, f64::from(iy + 1) * CELL), taken)
             })
         })
-    }
-
-    /// The most evidence in each of `count` squares of two cells by two, from the square with its lowest cell at (`x`, `y`) on; both are even.
-    fn row_of_squares(&self, x: i32, y: i32, count: usize) -> [i8; SQUARES] {
-        let mut most = [UNKNOWN; SQUARES];
-        let mut done = 0;
-        // Where the row crosses the rim of the memory it goes on at the other side, with another tile.
-        while done < count {
-            let x = x + 2 * done as i32;
-            let here = (count - done).min((SIDE - x.rem_euclid(SIDE)) as usize / 2);
-            for y in [y, y + 1] {
-                let (from, tile) = (slot(x, y), tile(x, y));
-                let cells = from..from + 2 * here;
-                let pairs =
-                    self.evidence[cells.clone()].chunks_exact(2).zip(self.tiles[cells].chunks_exact(2));
-                for (most, (evidence, tiles)) in most[done..done + here].iter_mut().zip(pairs) {
-                    let known = |k: usize| {
-                        if tiles[k] == tile && evidence[k] != 0 { evidence[k] } else { UNKNOWN }
-                    };
-                    *most = (*most).max(known(0)).max(known(1));
-                }
-            }
-            done += here;
-        }
-        most
     }
 
     /// Less evidence for what is nearer than an echo at `range` (m) from the sensor.
@@ -246,22 +186,21 @@ impl LocalMap {
             for step in -steps..=steps {
                 let (ix, iy) = walk.next().unwrap_or_else(|| index(point(step)));
                 // Of most cells in a cone it is known already, and there nothing changes, in a shadow or not.
-                let at = slot(ix, iy);
-                if self.evidence[at] == EVIDENCE.0 && self.tiles[at] == tile(ix, iy) {
+                if self.cells.evidence(ix, iy) == Some(EVIDENCE.0) {
                     continue;
                 }
                 let off = f64::from(step) * CELL;
                 if shaded && shadow[shade(off / away).min(SHADES - 1)] {
                     continue;
                 }
-                let at = self.slot_for(ix, iy);
-                if self.evidence[at] >= SURE && self.is_met_obliquely(ix, iy, sensor) {
+                let at = self.cells.slot_for(ix, iy);
+                if self.cells.get(at) >= SURE && self.is_met_obliquely(ix, iy, sensor) {
                     let (from, to) = (shade((off - CELL / 2.0) / away), shade((off + CELL / 2.0) / away));
                     shadow[from.min(SHADES - 1)..=to.min(SHADES - 1)].fill(true);
                     shaded = true;
                     continue;
                 }
-                self.set_evidence(at, (self.evidence[at] - loss).max(EVIDENCE.0));
+                self.cells.set(at, (self.cells.get(at) - loss).max(EVIDENCE.0));
             }
             away += CELL;
         }
@@ -271,8 +210,8 @@ impl LocalMap {
     fn is_met_obliquely(&self, x: i32, y: i32, sensor: Sensor) -> bool {
         let (mut n, mut sum, mut xx, mut xy, mut yy) = (0.0, Point::default(), 0.0, 0.0, 0.0);
         for dy in -FACE..=FACE {
-            for ix in columns(&self.sure, y + dy, x - FACE, 2 * FACE + 1) {
-                if self.tiles[slot(ix, y + dy)] == tile(ix, y + dy) {
+            for ix in self.cells.sure_in(y + dy, x - FACE, 2 * FACE + 1) {
+                if self.cells.evidence(ix, y + dy).is_some() {
                     let at = Point::new(f64::from(ix - x), f64::from(dy));
                     n += 1.0;
                     sum = sum + at;
@@ -306,9 +245,9 @@ impl LocalMap {
         let at_shortest = range <= self.params.shortest + CELL / 2.0;
         let nearest = if at_shortest { 0.0 } else { range - CELL };
         let range_to = range + 1.01 * CELL;
-        let surest = self.surest(sensor, steps, (nearest, range_to));
+        let surest = self.look_along(sensor, steps, (nearest, range_to));
         if surest >= SURE {
-            self.strengthen(sensor, steps, (nearest, range_to), (surest - 1).max(SURE), tick);
+            self.strengthen((surest - 1).max(SURE), tick);
             return;
         }
         let gain = if range < 0.6 {
@@ -320,39 +259,35 @@ impl LocalMap {
         };
         for step in -steps..=steps {
             let at = self.slot_of(sensor.turned(range, self.arcs.way(step, steps)));
-            self.set_evidence(at, (self.evidence[at] + gain).min(EVIDENCE.1));
-            self.heard[at] = tick;
+            self.cells.set(at, (self.cells.get(at) + gain).min(EVIDENCE.1));
+            self.cells.set_heard(at, tick);
         }
     }
 
-    /// The greatest evidence between two ranges on an arc.
-    fn surest(&mut self, sensor: Sensor, steps: i32, between: (f64, f64)) -> i8 {
+    /// Notes the cells between two ranges on an arc, and gives the greatest evidence of them.
+    fn look_along(&mut self, sensor: Sensor, steps: i32, between: (f64, f64)) -> i8 {
         let mut surest = EVIDENCE.0;
+        self.arc.clear();
         for step in -steps..=steps {
             let way = self.arcs.way(step, steps);
             let mut away = between.0;
             while away <= between.1 {
                 let at = self.slot_of(sensor.turned(away, way));
-                surest = surest.max(self.evidence[at]);
+                surest = surest.max(self.cells.get(at));
+                self.arc.push(at);
                 away += CELL;
             }
         }
         surest
     }
 
-    /// More evidence for those cells between two ranges on an arc that have this much already.
-    fn strengthen(&mut self, sensor: Sensor, steps: i32, between: (f64, f64), least: i8, tick: i32) {
-        for step in -steps..=steps {
-            let way = self.arcs.way(step, steps);
-            let mut away = between.0;
-            while away <= between.1 {
-                let at = self.slot_of(sensor.turned(away, way));
-                let evidence = self.evidence[at];
-                if evidence >= least {
-                    self.heard[at] = tick;
-                    self.set_evidence(at, (evidence + 1).min(EVIDENCE.1));
-                }
-                away += CELL;
+    /// More evidence for those of the noted cells that have this much already.
+    fn strengthen(&mut self, least: i8, tick: i32) {
+        for &at in &self.arc {
+            let evidence = self.cells.get(at);
+            if evidence >= least {
+                self.cells.set_heard(at, tick);
+                self.cells.set(at, (evidence + 1).min(EVIDENCE.1));
             }
         }
     }
@@ -366,7 +301,7 @@ impl LocalMap {
                 let middle = middle(ix, iy);
                 if (middle - pose.position()).is_within(inner) {
                     let at = self.slot_of(middle);
-                    self.set_evidence(at, EVIDENCE.0);
+                    self.cells.set(at, EVIDENCE.0);
                 }
             }
         }
@@ -376,60 +311,7 @@ impl LocalMap {
     #[inline]
     fn slot_of(&mut self, point: Point) -> usize {
         let (ix, iy) = index(point);
-        self.slot_for(ix, iy)
-    }
-
-    /// The same for the numbers of the cell.
-    #[inline]
-    fn slot_for(&mut self, ix: i32, iy: i32) -> usize {
-        let at = slot(ix, iy);
-        if self.tiles[at] != tile(ix, iy) {
-            self.set_evidence(at, 0);
-            self.tiles[at] = tile(ix, iy);
-            self.heard[at] = 0;
-        }
-        at
-    }
-
-    #[inline]
-    fn set_evidence(&mut self, at: usize, evidence: i8) {
-        let was = core::mem::replace(&mut self.evidence[at], evidence);
-        let (row, bit) = (at / SIDE as usize, 1 << (at % SIDE as usize));
-        // The bits change far less often than the evidence.
-        if (was > 0) != (evidence > 0) {
-            self.occupied[row] ^= bit;
-        }
-        if (was >= SURE) != (evidence >= SURE) {
-            self.sure[row] ^= bit;
-        }
-    }
-}
-
-/// The columns of the set bits in row `iy`, of `count` (less than the side) from column `first` on.
-fn columns(rows: &[Row; SIDE as usize], iy: i32, first: i32, count: i32) -> Columns {
-    let row = rows[iy.rem_euclid(SIDE) as usize];
-    let wanted = (1 << count) - 1;
-    Columns { left: row.rotate_right(first.rem_euclid(SIDE) as u32) & wanted, first }
-}
-
-/// The columns of the set bits of a row, from `first` on.
-#[derive(Clone)]
-struct Columns {
-    left: Row,
-    first: i32,
-}
-
-impl Iterator for Columns {
-    type Item = i32;
-
-    #[inline]
-    fn next(&mut self) -> Option<i32> {
-        if self.left == 0 {
-            return None;
-        }
-        let column = self.first + self.left.trailing_zeros() as i32;
-        self.left &= self.left - 1;
-        Some(column)
+        self.cells.slot_for(ix, iy)
     }
 }
 
@@ -568,19 +450,6 @@ fn middle(ix: i32, iy: i32) -> Point {
     Point::new((f64::from(ix) + 0.5) * CELL, (f64::from(iy) + 0.5) * CELL)
 }
 
-#[inline]
-fn slot(ix: i32, iy: i32) -> usize {
-    (iy.rem_euclid(SIDE) * SIDE + ix.rem_euclid(SIDE)) as usize
-}
-
-#[inline]
-fn tile(ix: i32, iy: i32) -> Tile {
-    // A shift rounds down, as is meant here; a division would round towards zero.
-    const SHIFT: u32 = SIDE.trailing_zeros();
-    const { assert!(1 << SHIFT == SIDE) };
-    Tile::from_le_bytes([(ix >> SHIFT) as u8, (iy >> SHIFT) as u8])
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -704,8 +573,8 @@ mod tests {
         let oldest = ticks(now) - ticks(Time::ZERO + map.params.keep);
         let cells = (y - span..=y + span).flat_map(|iy| (x - span..=x + span).map(move |ix| (ix, iy)));
         let occupied = cells.filter(|&(ix, iy)| {
-            let at = slot(ix, iy);
-            map.evidence[at] > 0 && map.heard[at] >= oldest && map.tiles[at] == tile(ix, iy)
+            map.cells.evidence(ix, iy).is_some_and(|evidence| evidence > 0)
+                && map.cells.heard(ix, iy) >= oldest
         });
         let (s, c) = (sin(pose.heading), cos(pose.heading));
         occupied
@@ -723,9 +592,8 @@ mod tests {
         let squares = corners.filter_map(|(dx, dy)| {
             let (ix, iy) = (low(x) + 2 * dx, low(y) + 2 * dy);
             let four = [(0, 0), (1, 0), (0, 1), (1, 1)].map(|(dx, dy)| (ix + dx, iy + dy));
-            let known = four.into_iter().filter(|&(x, y)| map.tiles[slot(x, y)] == tile(x, y));
-            let most =
-                known.map(|(x, y)| map.evidence[slot(x, y)]).filter(|evidence| *evidence != 0).max()?;
+            let known = four.into_iter().filter_map(|(x, y)| map.cells.evidence(x, y));
+            let most = known.filter(|evidence| *evidence != 0).max()?;
             let middle = Point::new(f64::from(ix + 1) * CELL, f64::from(iy + 1) * CELL);
             Some((middle, if most >= SURE { Some(true) } else { (most < 0).then_some(false) }))
         });
