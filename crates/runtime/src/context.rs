@@ -54,6 +54,12 @@ impl ReadySet {
         self.words()[rank as usize / 64] &= !(1 << (rank % 64));
     }
 
+    /// Whether none is ready.
+    #[inline]
+    pub(crate) fn is_empty(&self) -> bool {
+        self.words().iter().all(|word| *word == 0)
+    }
+
     /// The first rank at or behind `from` that is ready.
     #[inline]
     pub(crate) fn next(&self, from: u32) -> Option<u32> {

@@ -283,6 +283,12 @@ impl Core {
         self.releases.peek().map_or(Time::NEVER, |Reverse((time, _))| *time)
     }
 
+    /// Whether nobody has rung, nobody is ready and nothing is due: most looks find that.
+    #[inline]
+    pub(crate) fn is_idle(&self, now: Time) -> bool {
+        !self.door.is_rung() && self.next_release() > now && self.due.is_empty() && self.ready.is_empty()
+    }
+
     /// Takes what others have rung for, and serves changes.
     pub(crate) fn look_at_door(&mut self, context: &Context, now: Time) {
         let bits = self.door.take();

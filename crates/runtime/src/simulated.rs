@@ -217,7 +217,7 @@ impl Player {
         'again: loop {
             for place in 0..self.order.len() {
                 let at = self.order[place];
-                if self.blocked[at] > self.now {
+                if self.blocked[at] > self.now || self.cores[at].is_idle(self.now) {
                     continue;
                 }
                 let mut core = &mut self.cores[at];
