@@ -177,19 +177,23 @@ impl LocalMap {
         let widest = INSIDE * self.params.cone;
         let (mut shadow, mut shaded) = ([false; SHADES], false);
         let shade = |across: f64| ((across / widest + 1.0) * 0.5 * (SHADES - 1) as f64) as usize;
+        let stride = Walk::parts(sensor.left() * CELL);
         let mut away = CELL / 2.0;
         while away < free {
             let steps = whole(widest * away / CELL);
             let loss = if away < NEARBY { 2 } else { 1 };
-            let point = |step: i32| sensor.point(away, f64::from(step) * CELL);
-            let mut walk = Walk::new(sensor.point(away, 0.0), sensor.left() * CELL, steps);
-            for step in -steps..=steps {
-                let (ix, iy) = walk.next().unwrap_or_else(|| index(point(step)));
+            let mut walk = Walk::new(sensor.point(away, 0.0), stride, steps);
+            let mut next = -steps;
+            loop {
                 // Of most cells in a cone it is known already, and there nothing changes, in a shadow or not.
-                if self.cells.evidence(ix, iy) == Some(EVIDENCE.0) {
-                    continue;
+                let is_free = |ix, iy| self.cells.evidence(ix, iy) == Some(EVIDENCE.0);
+                next += walk.skip(steps + 1 - next, is_free);
+                if next > steps {
+                    break;
                 }
-                let off = f64::from(step) * CELL;
+                let off = f64::from(next) * CELL;
+                let (ix, iy) = walk.next().unwrap_or_else(|| index(sensor.point(away, off)));
+                next += 1;
                 if shaded && shadow[shade(off / away).min(SHADES - 1)] {
                     continue;
                 }
@@ -413,16 +417,20 @@ impl Walk {
     /// Farther out (m) a point has not the digits.
     const FARTHEST: f64 = 1e4;
 
-    /// From `steps` before the middle on.
-    fn new(middle: Point, step: Point, steps: i32) -> Walk {
+    /// A vector in whole numbers (2⁻³² of a cell).
+    fn parts(vector: Point) -> (i64, i64) {
         let part = |x: f64| (x * (4_294_967_296.0 / CELL)) as i64;
-        let (from, step) = ((part(middle.x), part(middle.y)), (part(step.x), part(step.y)));
+        (part(vector.x), part(vector.y))
+    }
+
+    /// From `steps` before the middle on, by `step` in whole numbers.
+    fn new(middle: Point, step: (i64, i64), steps: i32) -> Walk {
+        let (x, y) = Walk::parts(middle);
         let steps = steps.min(Walk::STEPS_MOST + 1);
         let near = middle.x.abs() < Walk::FARTHEST && middle.y.abs() < Walk::FARTHEST;
         let sure = near && steps <= Walk::STEPS_MOST;
         let back = i64::from(steps);
-        let at =
-            (from.0.wrapping_sub(step.0.wrapping_mul(back)), from.1.wrapping_sub(step.1.wrapping_mul(back)));
+        let at = (x.wrapping_sub(step.0.wrapping_mul(back)), y.wrapping_sub(step.1.wrapping_mul(back)));
         Walk { at, step, sure }
     }
 
@@ -430,9 +438,30 @@ impl Walk {
     fn next(&mut self) -> Option<(i32, i32)> {
         let (x, y) = self.at;
         self.at = (x.wrapping_add(self.step.0), y.wrapping_add(self.step.1));
-        let off = |part: i64| (part as u32).wrapping_add(Walk::DOUBT);
-        let sure = self.sure && off(x).min(off(y)) > 2 * Walk::DOUBT;
+        let sure = self.sure && Walk::is_inside(x) && Walk::is_inside(y);
         sure.then_some(((x >> 32) as i32, (y >> 32) as i32))
+    }
+
+    /// Goes on as long as it is sure of the cells and `pass` is true of them, for at most so many steps. Says how many they were.
+    #[inline]
+    fn skip(&mut self, most: i32, pass: impl Fn(i32, i32) -> bool) -> i32 {
+        let ((mut x, mut y), (across, along)) = (self.at, self.step);
+        let mut done = 0;
+        let goes_on = |x: i64, y: i64| {
+            Walk::is_inside(x) && Walk::is_inside(y) && pass((x >> 32) as i32, (y >> 32) as i32)
+        };
+        while self.sure && done < most && goes_on(x, y) {
+            (x, y) = (x.wrapping_add(across), y.wrapping_add(along));
+            done += 1;
+        }
+        self.at = (x, y);
+        done
+    }
+
+    /// Whether a coordinate is far enough from the borders of its cell.
+    #[inline]
+    fn is_inside(part: i64) -> bool {
+        (part as u32).wrapping_add(Walk::DOUBT) > 2 * Walk::DOUBT
     }
 }
 
@@ -642,10 +671,13 @@ mod tests {
             let (x, y) = if lined { (CELL * (x as i32 / 1000) as f64, CELL * (y as i32) as f64) } else { (if far { x } else { x / 1e4 }, y) };
             let pose = Pose::new(x, y, if lined { 0.0 } else { heading });
             let sensor = Sensor::new(&MapParams { rim: 0.2, ..MapParams::default() }, pose, 0.0);
-            let mut walk = Walk::new(sensor.point(away, 0.0), sensor.left() * CELL, steps);
+            let stride = Walk::parts(sensor.left() * CELL);
+            let mut walk = Walk::new(sensor.point(away, 0.0), stride, steps);
+            let skipped = Walk::new(sensor.point(away, 0.0), stride, steps).skip(2 * steps + 1, |_, _| true);
             for step in -steps..=steps {
                 let exact = index(sensor.point(away, f64::from(step) * CELL));
                 let found = walk.next();
+                prop_assert!(found.is_some() || skipped <= step + steps);
                 prop_assert!(found.is_none_or(|cell| cell == exact), "{:?} {:?}", found, exact);
             }
         }
