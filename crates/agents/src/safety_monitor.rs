@@ -9,7 +9,7 @@ use runtime::{Agent, Fault, Input, Output, Step};
 use types::geometry::{PI, wrap};
 use types::messages::{Drive, Odometry, Offer, Ranges, Safety, Twist};
 use types::params::Params;
-use types::{Duration, Pose, Time};
+use types::{Duration, Point, Pose, Time};
 
 use crate::shared::{Dated, echoes, ring};
 
@@ -144,6 +144,8 @@ impl Agent for SafetyMonitor {
 /// The most occupied cells that are looked at.
 const POINTS: usize = 2048;
 
+/// What is farther behind the middle of the robot than this is behind, however it is rounded (m).
+const HAIR: f64 = 1e-6;
 /// What is nearer to straight ahead than this is in front (rad): 40°, the beams that look ahead.
 const IN_FRONT: f64 = 0.7;
 /// What is farther from straight ahead than this is left behind (rad): 110°.
@@ -236,7 +238,7 @@ impl Watch {
         }
         let points = self.map.around(pose, params.radius + params.horizon, stamp, 1).take(POINTS);
         self.points.clear();
-        self.points.extend(points.map(|point| (point.bearing(), point.norm())));
+        self.points.extend(that_count(points));
         (!self.points.is_empty()).then(|| judge_way(&params.law(), Ring::Beams(&self.points), self.motion))
     }
 
@@ -276,6 +278,17 @@ impl Watch {
             ..Offer::default()
         })
     }
+}
+
+/// Bearing (rad) and distance (m) of the points that count: what is behind is in no way, and counts only where it is nearest.
+fn that_count(points: impl Iterator<Item = Point>) -> impl Iterator<Item = (f64, f64)> {
+    let mut nearest = f64::INFINITY;
+    points.filter_map(move |point| {
+        let range = point.norm();
+        let counts = point.x >= -HAIR || range < nearest;
+        nearest = nearest.min(range);
+        counts.then(|| (point.bearing(), range))
+    })
 }
 
 #[cfg(test)]
@@ -345,6 +358,25 @@ mod tests {
         let later = Time::from_seconds(2.1);
         watch.filtered = Some(Dated { value: around(6.2, 4.0, 4.0), stamp: later });
         assert!(watch.judge(&unaware, later).0.linear_max > 0.0);
+    }
+
+    #[test]
+    fn points_that_do_not_count_change_no_verdict() {
+        let stream = types::chance::Stream::new(1, "points");
+        let law = SafetyParams::default().law();
+        let mut left_out = 0;
+        for run in 0..500 {
+            let draw = stream.sample(run);
+            let points = (0..20)
+                .map(|k| Point::new(draw.between(2 * k, -1.5, 1.5), draw.between(2 * k + 1, -1.5, 1.5)));
+            let all: Vec<_> = points.clone().map(|point| (point.bearing(), point.norm())).collect();
+            let some: Vec<_> = that_count(points).collect();
+            let motion = Twist::new(draw.between(100, -0.1, 0.6), draw.between(101, -1.0, 1.0));
+            let judged = |points: &[(f64, f64)]| judge_way(&law, Ring::Beams(points), motion);
+            assert_eq!(judged(&some), judged(&all), "run {run}");
+            left_out += all.len() - some.len();
+        }
+        assert!(left_out > 2000, "{left_out}");
     }
 
     #[test]
