@@ -13,8 +13,8 @@ use crate::read::read_pose;
 use crate::shape::{self, Segment};
 use types::chance::Stream;
 
-/// The way that must be free has this width (m): a robot of 0.45 m and 0.1 m on either side.
-pub const FREE_WIDTH: f64 = 0.65;
+/// The way that must be free has this width (m): a robot of 0.45 m and 0.17 m on either side, which a sonar tells from touching.
+pub const FREE_WIDTH: f64 = 0.8;
 /// Attempts until a seed is given up.
 const ATTEMPTS: u64 = 200;
 /// Attempts to find a new place for one thing, or a start.
