@@ -46,6 +46,14 @@ const WORTH: u32 = 60;
 const FREE: u32 = 3;
 /// A place around which fewer cells are new is a chink between things that stand about.
 const LEAST: u32 = 30;
+/// Where a body would stand freely, as far as is known, is no chink and no echo from behind a wall, which make spikes. Such cells
+/// are counted in a square of so many cells to each side (1.5 m).
+const WIDE_AROUND: usize = 7;
+/// For each of them it goes so many cells of way more, up to 15 m: across a room to the door.
+const WIDE_EACH: u32 = 2;
+const WIDE_MOST: u32 = 150;
+/// So many of them are wide ground: half a square metre, as is heard through a door.
+const WIDE: u32 = 50;
 /// How far beyond what it has been near to a place is looked for (cells).
 const RIM: f64 = 2.0;
 
@@ -95,6 +103,7 @@ pub struct Ground {
     shut: Layer,
     new: Layer,
     open: Layer,
+    roomy: Layer,
     search: Search,
 }
 
@@ -119,6 +128,7 @@ impl Ground {
             shut: Layer::default(),
             new: Layer::default(),
             open: Layer::default(),
+            roomy: Layer::default(),
             search: Search::new(),
         }
     }
@@ -134,6 +144,11 @@ impl Ground {
     pub fn forget_trodden(&mut self) {
         self.given_up.clear();
         self.trodden.clear();
+    }
+
+    /// Forgets where it did not get to: by now there may be a way.
+    pub fn forget_given_up(&mut self) {
+        self.given_up.clear();
     }
 
     /// Forgets what stands about: some of it may have been an echo of something else.
@@ -192,32 +207,60 @@ impl Ground {
         self.disc(at, room).any(|cell| self.taken.get(cell))
     }
 
-    /// The way from here to new ground that a body gets to, near and with much that is new around it; none if there is none. To `goal`,
-    /// where it was going, as long as that is new and there is a way.
+    /// The way from here to new ground that a body gets to, near and with much that is new around it, and best with room to stand in; none if
+    /// there is none. To `goal`, where it was going, as long as that is new and there is a way.
     pub fn way_to_new(&mut self, here: Point, room: Room, goal: Option<Point>) -> Option<Way> {
         let start = self.cell(here)?;
-        // What stands there may reach half a cell towards the body.
-        self.closed.dilate(&self.taken, room.least / CELL - 0.5);
-        self.tight.dilate(&self.taken, room.keep / CELL);
-        self.within.dilate(&self.trodden, RIM);
-        self.new.unite(&self.trodden, &self.given_up);
-        self.shut.unite(&self.new, &self.closed);
-        self.new.difference(&self.within, &self.shut);
-        self.open.difference(&self.free, &self.shut);
+        self.draw(room);
         let goal = goal.and_then(|goal| self.cell(goal));
-        let Ground { closed, tight, taken, within, new, shut, open, .. } = self;
+        let Ground { closed, tight, taken, within, new, .. } = self;
         let floor = Floor { closed, tight, taken, within };
         // A place that was set out for is gone to as long as there is a way; else it would turn around for each that comes into sight.
         let again =
             goal.and_then(|goal| self.search.run(start, &floor, new, 0, |cell| (cell == goal).then_some(0)));
-        let goal = again.or_else(|| {
-            self.search.run(start, &floor, new, WORTH, |cell| {
-                let area = AREA - shut.count(cell, AROUND);
-                let sum = area + FREE * open.count(cell, AROUND);
-                (area >= LEAST).then(|| sum * WORTH / ((1 + FREE) * AREA))
-            })
-        })?;
+        let goal = again.or_else(|| self.best(start, 0))?;
         Some(self.way(goal))
+    }
+
+    /// The way from here to wide new ground, such as is heard through a door or along a corridor; none if there is none.
+    pub fn way_to_wide(&mut self, here: Point, room: Room) -> Option<Way> {
+        let start = self.cell(here)?;
+        self.draw(room);
+        let goal = self.best(start, WIDE)?;
+        Some(self.way(goal))
+    }
+
+    /// The new cell that is near for what it is worth, of those around which so many are wide.
+    fn best(&mut self, start: usize, least: u32) -> Option<usize> {
+        let Ground { closed, tight, taken, within, new, shut, open, roomy, .. } = self;
+        let floor = Floor { closed, tight, taken, within };
+        self.search.run(start, &floor, new, WORTH + WIDE_MOST, |cell| {
+            let area = AREA - shut.count(cell, AROUND);
+            let sum = area + FREE * open.count(cell, AROUND);
+            let wide = roomy.count(cell, WIDE_AROUND);
+            let worth = sum * WORTH / ((1 + FREE) * AREA) + (WIDE_EACH * wide).min(WIDE_MOST);
+            (wide >= least && (area >= LEAST || wide > 0)).then_some(worth)
+        })
+    }
+
+    /// Draws the layers that a search looks at, from what is known.
+    fn draw(&mut self, room: Room) {
+        // What stands there may reach half a cell towards the body.
+        self.closed.dilate(&self.taken, room.least / CELL - 0.5);
+        self.tight.dilate(&self.taken, room.keep / CELL);
+        self.new.unite(&self.trodden, &self.given_up);
+        self.shut.unite(&self.new, &self.closed);
+        self.open.difference(&self.free, &self.shut);
+        // The body stands freely where no cell within its radius may be taken; two layers serve as paper.
+        let Ground { free, taken, trodden, shut, roomy, new, within, .. } = self;
+        new.unite(free, trodden);
+        within.difference(new, taken);
+        new.invert(within);
+        within.dilate(new, room.least / CELL);
+        new.unite(within, shut);
+        roomy.invert(new);
+        self.within.dilate(&self.trodden, RIM);
+        self.new.difference(&self.within, &self.shut);
     }
 
     fn way(&self, goal: usize) -> Way {
@@ -341,6 +384,40 @@ mod tests {
         assert!(room(0.4).way_to_new(Point::new(-1.0, 1.0), ROOM, None).is_none());
     }
 
+    /// All cells of a rectangle.
+    fn see_all(ground: &mut Ground, from: (f64, f64), to: (f64, f64), seen: Seen) {
+        let cells =
+            |low: f64, high: f64| (0..((high - low) / CELL) as i32).map(move |i| low + CELL * f64::from(i));
+        for x in cells(from.0, to.0) {
+            for y in cells(from.1, to.1) {
+                ground.see(Point::new(x + CELL / 2.0, y + CELL / 2.0), Some(seen));
+            }
+        }
+    }
+
+    #[test]
+    fn wide_ground_far_away_is_worth_more_than_a_chink_nearby() {
+        let mut ground = room(0.9);
+        // Beyond the gap on the right a corridor is heard; on the left spikes behind the wall, and a hole in it.
+        see_all(&mut ground, (2.1, -0.8), (3.1, 0.8), Seen::Free);
+        for i in 0..6 {
+            let y = -0.9 + 0.3 * f64::from(i);
+            see_all(&mut ground, (-3.0, y), (-2.1, y + 0.2), Seen::Free);
+        }
+        for i in -3..=3 {
+            ground.see(Point::new(-2.0, 0.1 * f64::from(i)), Some(Seen::Free));
+        }
+        let here = Point::new(-1.4, 0.0);
+        let goal = ground.way_to_new(here, ROOM, None).unwrap().goal();
+        assert!(goal.x > 1.9, "{goal:?}");
+        let wide = ground.way_to_wide(here, ROOM).unwrap().goal();
+        assert!(wide.x > 1.9, "{wide:?}");
+        // Without the corridor there is only the hole.
+        see_all(&mut ground, (2.0, -0.8), (3.1, 0.8), Seen::Taken);
+        assert!(ground.way_to_wide(here, ROOM).is_none());
+        assert!(ground.way_to_new(here, ROOM, None).unwrap().goal().x < -1.9);
+    }
+
     #[test]
     fn what_stands_between_is_not_trodden_and_what_was_given_up_is_not_gone_to() {
         let mut ground = room(0.9);
@@ -348,9 +425,8 @@ mod tests {
         let goal = ground.way_to_new(Point::default(), ROOM, None).unwrap().goal();
         ground.give_up(goal, 1.5);
         assert!(ground.way_to_new(Point::default(), ROOM, None).is_none());
-        ground.forget_trodden();
-        ground.tread(Point::default(), 0.7);
-        assert!(ground.way_to_new(Point::default(), ROOM, None).is_some());
+        ground.forget_given_up();
+        assert_eq!(ground.way_to_new(Point::default(), ROOM, None).unwrap().goal(), goal);
     }
 
     #[test]

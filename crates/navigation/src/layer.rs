@@ -72,6 +72,13 @@ impl Layer {
         }
     }
 
+    /// Into `self` what is not in `one`.
+    pub(crate) fn invert(&mut self, one: &Layer) {
+        for (out, one) in self.0.iter_mut().zip(one.0.iter()) {
+            *out = one.map(|word| !word);
+        }
+    }
+
     /// Into `self` all cells within `radius` (cells) of one that is in `from`.
     pub(crate) fn dilate(&mut self, from: &Layer, radius: f64) {
         self.clear();
@@ -165,5 +172,8 @@ mod tests {
         off.difference(&full, &some);
         assert_eq!((0..SIDE * SIDE).filter(|c| off.get(*c)).count(), 2 * SIDE - 1);
         assert!(off.get(3 * SIDE) && off.get(70) && !off.get(71));
+        let mut inverse = Layer::default();
+        inverse.invert(&some);
+        assert_eq!(inverse, off);
     }
 }

@@ -5,9 +5,11 @@
 //!  ┌────────┐ ─────────────────▶ ┌───────────┐ ──────────────────────────────▶ ┌─────────┐
 //!  │ Search │                    │ Following │                                 │ Leaving │
 //!  └────────┘ ◀───────────────── └───────────┘                                 └─────────┘
-//!       ▲        nothing near                                                       │
-//!       └───────────────────────────────────────────────────────────────────────────┘
-//!                                 it has come to new ground
+//!     │ ▲        nothing near                                                     ▲   │
+//!     │ └─────────────────────────────────────────────────────────────────────────┼───┘
+//!     │                           it has come to new ground                       │
+//!     └───────────────────────────────────────────────────────────────────────────┘
+//!             something in the way, and near it wide ground that is new
 //! ```
 //!
 //! The hand rule alone circles islands, and of a loop of rooms it may never see the middle. What is known of the [`Ground`] tells when
@@ -47,7 +49,8 @@ pub struct Parameters {
     pub near: f64,
     /// It leaves what it follows when it has come to no new ground for this long (s).
     pub restless: f64,
-    /// It gives up a place that it does not get to when it has not got away from one spot for this long (s).
+    /// It gives up a place that it does not get to when it has not got away from one spot for this long (s), or has come no nearer for this
+    /// long and the time that the way should take.
     pub patience: f64,
 }
 
@@ -57,7 +60,7 @@ impl Parameters {
     /// `keep` is two radii less a little: at a door of four radii that is the middle. The least room is 4 cm beside the body: twice the error of a
     /// sonar nearby. It looks three radii ahead, which is what a turn in place needs and the step aside after it. 0.4 m/s and a gain of 2
     /// need 0.2 m of way for an error to fall to 1/e, less than `keep`. It creeps at an eighth of the speed, so the view changes. Two seconds to
-    /// full speed let a false start be noticed. A place three radii away is seen well. Six seconds are two metres of way, fifteen are enough to turn around twice.
+    /// full speed let a false start be noticed. A place four radii away is seen well. Four seconds are a metre and a half of way, fifteen are enough to turn around twice.
     pub fn new(radius: f64) -> Parameters {
         Parameters {
             side: Side::Left,
@@ -69,8 +72,8 @@ impl Parameters {
             growth: 0.3,
             turn_max: 1.0,
             turn_gain: 2.0,
-            near: 3.0 * radius,
-            restless: 6.0,
+            near: 4.0 * radius,
+            restless: 4.0,
             patience: 15.0,
         }
     }
@@ -135,6 +138,16 @@ const SOME: f64 = 0.05;
 const WAY_LASTS: f64 = 2.0;
 /// A way that costs so much less than before leads on (m).
 const GAIN: f64 = 0.2;
+/// A way that is lost from sight is gone on with for so long: it may be an echo that seems to close a door (s).
+const WAY_HOLDS: f64 = 6.0;
+/// Where its way is blocked it looks for so long before it goes around: from nearby an echo of something else is told (s).
+const LOOKS: f64 = 2.0;
+/// A metre of way takes no longer than this, in a narrow place (s).
+const SLOW: f64 = 5.0;
+/// After this it forgets which places it gave up (s).
+const TRIES_AGAIN: f64 = 90.0;
+/// Wide new ground within this way is gone to, rather than along what is in the way (m).
+const AT_HAND: f64 = 3.0;
 /// How far ahead on its way it steers to, at most and at least (m).
 const CARROT: f64 = 1.0;
 const STRIDE: f64 = 0.2;
@@ -159,6 +172,10 @@ pub struct Roamer {
     /// The least that this way has cost, and how long it costs no less (s).
     least_cost: f64,
     gain_age: f64,
+    /// For how long there is no way to where it goes, for how long it is blocked, and how long ago it gave up a place (s).
+    lost_age: f64,
+    blocked_age: f64,
+    given_up_age: f64,
     /// How far it has gone (m).
     travelled: f64,
     spot: Point,
@@ -184,6 +201,9 @@ impl Roamer {
             way_age: 0.0,
             least_cost: 0.0,
             gain_age: 0.0,
+            lost_age: 0.0,
+            blocked_age: 0.0,
+            given_up_age: 0.0,
             travelled: 0.0,
             spot: pose.position(),
             spot_since: 0.0,
@@ -245,6 +265,12 @@ impl Roamer {
         self.stale = if new >= SOME { 0.0 } else { self.stale + dt };
         self.way_age += dt;
         self.gain_age += dt;
+        self.blocked_age += dt;
+        self.given_up_age += dt;
+        if self.given_up_age > TRIES_AGAIN {
+            self.given_up_age = 0.0;
+            ground.forget_given_up();
+        }
         let here = self.pose.position();
         if here.distance(self.spot) > SPOT {
             (self.spot, self.spot_since) = (here, 0.0);
@@ -267,6 +293,11 @@ impl Roamer {
         let look = self.parameters.look;
         let free = fans.iter().find_map(|fan| fan.nearest_free(ahead, look, SAME_WAY));
         if free.is_none() {
+            let wide = ground.way_to_wide(self.real_pose().position(), self.room());
+            if let Some(way) = wide.filter(|way| way.cost() <= AT_HAND) {
+                self.go(way);
+                return self.leave(fans, ground);
+            }
             self.anchor = self.pose.transform(fans[2].stop(ahead));
             self.mode = Mode::Following;
             return fans[2].sweep(ahead, look).map(|found| found.direction);
@@ -327,44 +358,80 @@ impl Roamer {
     /// Sets out for new ground, if there is any. Where there seems to be none, what stands about is looked at anew, and after that the floor.
     fn set_out(&mut self, ground: &mut Ground) -> bool {
         self.stale = 0.0;
-        (self.spot, self.spot_since) = (self.pose.position(), 0.0);
-        if !self.find_way(ground) {
-            if ground.has_taken() {
-                ground.forget_taken()
-            } else {
-                ground.forget_trodden()
-            }
-            return false;
+        self.stay();
+        let goal = self.goal(ground);
+        let way = ground.way_to_new(self.real_pose().position(), self.room(), goal);
+        if let Some(way) = way {
+            self.go(way);
+        } else if ground.has_taken() {
+            ground.forget_taken();
+        } else {
+            ground.forget_trodden();
         }
-        (self.mode, self.gain_age) = (Mode::Leaving, 0.0);
-        self.left += 1;
-        true
+        way.is_some()
     }
 
+    /// Sets out on a way.
+    fn go(&mut self, way: Way) {
+        self.stale = 0.0;
+        self.stay();
+        self.take(way);
+        self.mode = Mode::Leaving;
+        (self.gain_age, self.blocked_age) = (0.0, 0.0);
+        self.left += 1;
+    }
+
+    /// Looks from here on how far it gets.
+    fn stay(&mut self) {
+        (self.spot, self.spot_since) = (self.pose.position(), 0.0);
+    }
+
+    const fn room(&self) -> Room {
+        Room { least: self.parameters.least, keep: self.parameters.keep }
+    }
+
+    /// Where it goes to, as long as that is new.
+    fn goal(&self, ground: &Ground) -> Option<Point> {
+        self.way.map(|way| way.goal()).filter(|goal| !ground.is_known(*goal))
+    }
+
+    fn take(&mut self, way: Way) {
+        if self.way.map(|before| before.goal()) != Some(way.goal()) {
+            self.least_cost = way.cost();
+        } else if way.cost() < self.least_cost - GAIN {
+            (self.least_cost, self.gain_age) = (way.cost(), 0.0);
+        }
+        (self.way, self.way_age, self.lost_age) = (Some(way), 0.0, 0.0);
+    }
+
+    /// Looks anew for the way to where it goes, and, where there is none for some time, to another place.
     fn find_way(&mut self, ground: &mut Ground) -> bool {
-        let Parameters { least, keep, .. } = self.parameters;
-        let here = self.real_pose().position();
-        let goal = self.way.map(|way| way.goal()).filter(|goal| !ground.is_known(*goal));
-        self.way = ground.way_to_new(here, Room { least, keep }, goal);
-        self.way_age = 0.0;
-        if let Some(way) = &self.way {
-            if goal != Some(way.goal()) {
-                self.least_cost = way.cost();
-            } else if way.cost() < self.least_cost - GAIN {
-                (self.least_cost, self.gain_age) = (way.cost(), 0.0);
+        let goal = self.goal(ground);
+        let way = ground.way_to_new(self.real_pose().position(), self.room(), goal);
+        if goal.is_some() && way.map(|way| way.goal()) != goal {
+            self.lost_age += self.way_age;
+            if self.lost_age < WAY_HOLDS {
+                self.way_age = 0.0;
+                return true;
             }
         }
-        self.way.is_some()
+        match way {
+            Some(way) => self.take(way),
+            None => (self.way, self.lost_age) = (None, 0.0),
+        }
+        way.is_some()
     }
 
     /// Along the way to new ground, around what is in it.
     fn leave(&mut self, fans: &[Fan; 3], ground: &mut Ground) -> Option<usize> {
-        if self.gain_age > self.parameters.patience {
+        let patience = self.parameters.patience;
+        if self.gain_age > patience + SLOW * self.least_cost || self.spot_since > patience {
             // It does not get there.
             if let Some(way) = &self.way {
                 ground.give_up(way.goal(), self.parameters.near);
             }
-            (self.way, self.gain_age) = (None, 0.0);
+            (self.way, self.gain_age, self.given_up_age) = (None, 0.0, 0.0);
+            self.stay();
         }
         let arrived = self.way.is_some_and(|way| ground.is_known(way.goal()));
         if arrived {
@@ -377,6 +444,9 @@ impl Roamer {
         }
         let (ahead, far) = self.carrot(&fans[2])?;
         if fans[2].way(ahead) >= far {
+            self.blocked_age = 0.0;
+        }
+        if self.blocked_age < LOOKS {
             return Some(ahead);
         }
         let least = LAST * self.parameters.look;
@@ -431,6 +501,7 @@ fn mirrored(pose: Pose, side: Side) -> Pose {
 mod tests {
     use super::*;
     use crate::ground::Seen;
+    use types::geometry::PI;
 
     /// A straight wall, a point every 5 cm.
     fn wall(from: (f64, f64), to: (f64, f64)) -> Vec<Point> {
@@ -464,7 +535,32 @@ mod tests {
         ground: Ground,
     }
 
-    /// Drives until `done` says so, five steps a second, with a sensor that sees two metres far.
+    impl Driven {
+        /// Drives until `done` says so, five steps a second, with a sensor that sees two metres far.
+        fn go(&mut self, world: &[Point], seconds: f64, mut done: impl FnMut(&Roamer, Pose) -> bool) {
+            let Driven { pose, nearest, turned, roamer, ground } = self;
+            for _ in 0..(seconds / 0.2) as usize {
+                let inverse = pose.inverse();
+                let seen = world.iter().map(|p| inverse.transform(*p)).filter(|p| p.norm() < 2.0);
+                *nearest = seen.clone().fold(*nearest, |near, p| fmin(near, p.norm()));
+                for point in seen.clone() {
+                    ground.see(pose.transform(point), Some(Seen::Taken));
+                }
+                let twist = roamer.step(seen, Beside::default(), *pose, ground, 0.2);
+                *pose = pose.along_arc(0.2 * twist.linear, 0.2 * twist.angular);
+                *turned += 0.2 * fabs(twist.angular);
+                if done(roamer, *pose) {
+                    break;
+                }
+            }
+        }
+    }
+
+    fn at_start(parameters: Parameters, pose: Pose) -> Driven {
+        let roamer = Roamer::new(parameters, pose);
+        Driven { pose, nearest: f64::INFINITY, turned: 0.0, roamer, ground: Ground::new() }
+    }
+
     fn drive(
         parameters: Parameters,
         world: &[Point],
@@ -472,24 +568,8 @@ mod tests {
         seconds: f64,
         done: impl Fn(&Roamer, Pose) -> bool,
     ) -> Driven {
-        let roamer = Roamer::new(parameters, start);
-        let mut driven =
-            Driven { pose: start, nearest: f64::INFINITY, turned: 0.0, roamer, ground: Ground::new() };
-        let Driven { pose, nearest, turned, roamer, ground } = &mut driven;
-        for _ in 0..(seconds / 0.2) as usize {
-            let inverse = pose.inverse();
-            let seen = world.iter().map(|p| inverse.transform(*p)).filter(|p| p.norm() < 2.0);
-            *nearest = seen.clone().fold(*nearest, |near, p| fmin(near, p.norm()));
-            for point in seen.clone() {
-                ground.see(pose.transform(point), Some(Seen::Taken));
-            }
-            let twist = roamer.step(seen, Beside::default(), *pose, ground, 0.2);
-            *pose = pose.along_arc(0.2 * twist.linear, 0.2 * twist.angular);
-            *turned += 0.2 * fabs(twist.angular);
-            if done(roamer, *pose) {
-                break;
-            }
-        }
+        let mut driven = at_start(parameters, start);
+        driven.go(world, seconds, done);
         driven
     }
 
@@ -527,6 +607,28 @@ mod tests {
         for (x, y) in [(1.0, 3.0), (4.3, 0.7), (0.7, 0.7), (0.7, 7.3), (4.3, 7.3), (2.5, 5.5)] {
             assert!(driven.ground.is_known(Point::new(x, y)), "({x}, {y})");
         }
+        assert!(driven.nearest > 0.25, "{}", driven.nearest);
+    }
+
+    #[test]
+    fn at_the_end_of_a_corridor_it_goes_around_the_corner_and_not_back_along_the_other_wall() {
+        let corners =
+            [(-1.0, 6.0), (-1.0, 0.0), (1.0, 0.0), (1.0, 8.0), (-5.0, 8.0), (-5.0, 6.0), (-1.0, 6.0)];
+        let world: Vec<Point> = corners.windows(2).flat_map(|two| wall(two[0], two[1])).collect();
+        let mut driven = at_start(Parameters::new(0.225), Pose::new(-0.4, 1.0, PI / 2.0));
+        // Up to the upper wall the corridor is free, and it is heard that its left part is.
+        for i in 0..720 {
+            let (x, y) = (0.95 - 0.1 * f64::from(i % 40), 6.15 + 0.1 * f64::from(i / 40));
+            driven.ground.see(Point::new(x, y), Some(Seen::Free));
+        }
+        let mut lowest_after = f64::INFINITY;
+        driven.go(&world, 60.0, |_, pose| {
+            if pose.y > 6.5 || lowest_after.is_finite() {
+                lowest_after = lowest_after.min(pose.y);
+            }
+            pose.x < -3.0
+        });
+        assert!(driven.pose.x < -3.0 && lowest_after > 6.0, "{:?} {lowest_after}", driven.pose);
         assert!(driven.nearest > 0.25, "{}", driven.nearest);
     }
 
