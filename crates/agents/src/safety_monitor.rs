@@ -58,12 +58,15 @@ pub struct SafetyParams {
     /// Highest speed while it turns away (m/s). 0.2 keeps the curve short.
     #[param(default = 0.2, min = 0.0, max = 10.0)]
     pub avoid_speed: f64,
-    /// Distance from the rim to what is beside it, at which it only creeps (m). 0.17: a sonar tells 0.15 m of all that is nearer.
+    /// Distance from the rim to what is beside it, at which it goes slowly (m). 0.17: a sonar tells 0.15 m of all that is nearer.
     #[param(default = 0.17, min = 0.0, max = 2.0)]
     pub touch: f64,
-    /// Highest speed with something that close beside it (m/s). 0.1 is 2.5 cm between two readings at 4 Hz.
+    /// Highest speed with something that close obliquely ahead (m/s). 0.1 is 2.5 cm between two readings at 4 Hz.
     #[param(default = 0.1, min = 0.0, max = 10.0)]
     pub creep: f64,
+    /// Highest speed past something that close beside it (m/s). At 0.35 it turns away by half a radian, if it must, within one length of its body.
+    #[param(default = 0.35, min = 0.0, max = 10.0)]
+    pub pass: f64,
     /// How long what was near is remembered while no sensor hears it (time). 10 s is a metre at a creep; longer, and somebody who was followed still stands where he has left.
     #[param(default = Duration::secs(10), min = 0.0, max = 60.0)]
     pub remember: Duration,
@@ -148,6 +151,9 @@ const POINTS: usize = 2048;
 const HAIR: f64 = 1e-6;
 /// What is nearer to straight ahead than this is in front (rad): 40°, the beams that look ahead.
 const IN_FRONT: f64 = 0.7;
+/// What is nearer to straight ahead than this comes nearer still (rad): 65°. Farther off it, a robot that goes straight on comes no nearer than 9 % of
+/// its distance from the middle of the body, 4 cm of what can be told.
+const OBLIQUE: f64 = 1.13;
 /// What is farther from straight ahead than this is left behind (rad): 110°.
 const BESIDE: f64 = 0.6 * PI;
 /// A turn at this rate is one (rad/s), not the noise of a controller.
@@ -242,14 +248,20 @@ impl Watch {
         (!self.points.is_empty()).then(|| judge_way(&params.law(), Ring::Beams(&self.points), self.motion))
     }
 
-    /// With something beside it as near as can be told it creeps; with that in front it may be nearer than told, and it stands.
+    /// With something obliquely ahead as near as can be told it creeps, and past it, beside it, it goes slowly; with that in front it may
+    /// be nearer than told, and it stands.
     fn touch(&self, params: &SafetyParams, filtered: &Ranges, verdict: &mut Verdict) {
         let close = f64::from(filtered.range_min).max(params.radius + params.touch);
         if echoes(filtered).any(|(bearing, range)| range <= close && wrap(bearing).abs() < IN_FRONT) {
             (verdict.forward, verdict.linear_max) = (false, 0.0);
         }
-        if verdict.nearest <= params.touch && verdict.nearest_bearing.abs() <= BESIDE {
+        let touched = |(bearing, range): (f64, f64)| {
+            range - params.radius <= params.touch && wrap(bearing).abs() <= OBLIQUE
+        };
+        if echoes(filtered).any(touched) || self.points.iter().copied().any(touched) {
             verdict.linear_max = verdict.linear_max.min(params.creep);
+        } else if verdict.nearest <= params.touch && verdict.nearest_bearing.abs() <= BESIDE {
+            verdict.linear_max = verdict.linear_max.min(params.pass);
         }
     }
 
@@ -380,14 +392,31 @@ mod tests {
     }
 
     #[test]
-    fn with_something_close_beside_it_it_creeps_past() {
+    fn it_creeps_up_to_something_close_obliquely_ahead_and_goes_slowly_past_it() {
         let params = SafetyParams::default();
-        let beside = |range| {
+        let close = |beam: usize, range| {
             let mut ranges = around(4.0, 4.0, 4.0);
-            ranges.values[3] = range;
+            ranges.values[beam] = range;
             watch(ranges).judge(&params, Time::ZERO).0.linear_max
         };
-        assert_eq!((beside(0.375), beside(0.45)), (0.1, 0.6));
+        // At 60°, at 90° and at 120°.
+        assert_eq!([2, 3, 4].map(|beam| close(beam, 0.375)), [0.1, 0.35, 0.6]);
+        assert_eq!([10, 9, 8].map(|beam| close(beam, 0.375)), [0.1, 0.35, 0.6]);
+        assert_eq!([2, 3].map(|beam| close(beam, 0.45)), [0.6, 0.6]);
+    }
+
+    #[test]
+    fn what_is_remembered_obliquely_ahead_counts_although_something_beside_it_is_nearer() {
+        let params = SafetyParams::default();
+        let mut near = around(4.0, 4.0, 4.0);
+        (near.values[2], near.values[3]) = (0.385, 0.375);
+        let mut watch = watch(near);
+        watch.pose = Some(Pose::default());
+        watch.judge(&params, Time::ZERO);
+        near.values[2] = 6.2;
+        let later = Time::from_seconds(0.25);
+        watch.filtered = Some(Dated { value: near, stamp: later });
+        assert_eq!(watch.judge(&params, later).0.linear_max, params.creep);
     }
 
     #[test]

@@ -27,8 +27,8 @@ pub struct WallParams {
     /// Distance to keep from its middle to everything where there is room (m). 0.42 leaves what a sonar can tell apart beside the body, and fits into a door of 0.9 m.
     #[param(default = 0.42, min = 0.05, max = 5.0)]
     pub keep: f64,
-    /// Distance from its middle with which it still goes through (m). 0.27 leaves twice the error of a sonar beside the body.
-    #[param(default = 0.27, min = 0.05, max = 5.0)]
+    /// Distance from its middle with which it still goes through (m). 0.3 leaves three times the error of a sonar beside the body.
+    #[param(default = 0.3, min = 0.05, max = 5.0)]
     pub least: f64,
     /// Way that must be free ahead (m). 0.65 is more than the body is long; a niche that is not deeper is taken for wall.
     #[param(default = 0.65, min = 0.05, max = 3.0)]
@@ -45,11 +45,11 @@ pub struct WallParams {
     /// How long what was near is remembered while no sensor hears it (time). 30 s is how long a robot may turn about in a corner; on so short a way the odometry drifts by centimetres.
     #[param(default = Duration::secs(30), min = 0.0, max = 600.0)]
     pub remember: Duration,
-    /// Ground that it has come as near to is not new any more (m). 0.75: a ring of sonars sees a place well from as near.
-    #[param(default = 0.75, min = 0.05, max = 5.0)]
+    /// Ground that it has come as near to is not new any more (m). 0.9: a ring of sonars sees a place well from as near.
+    #[param(default = 0.9, min = 0.05, max = 5.0)]
     pub near: f64,
-    /// It leaves what it follows when it has come to no new ground for this long (s). 6 are two metres of way among things.
-    #[param(default = 6.0, min = 0.5, max = 600.0)]
+    /// It leaves what it follows when it has come to no new ground for this long (s). 4 are a metre and a half of way among things.
+    #[param(default = 4.0, min = 0.5, max = 600.0)]
     pub restless: f64,
     /// It gives up a place when it has not got away from one spot for this long (s). 15 is time to turn around twice.
     #[param(default = 15.0, min = 1.0, max = 600.0)]
