@@ -1,7 +1,7 @@
 //! The wall follower: along the walls, through every gap that is wide enough, and away from what it only circles.
 
 use motion::wall::Side;
-use navigation::ground::{Ground, Seen};
+use navigation::ground::Ground;
 use navigation::roam::{Beside, Parameters, Roamer};
 use perception::local_map::{LocalMap, MapParams};
 use runtime::{Agent, Fault, Input, Output, Step};
@@ -171,8 +171,8 @@ impl Walk {
         let here = at.or(self.pose).unwrap_or_default();
         self.map.set_params(params.map());
         self.map.update(echoes(ranges), here, stamp);
-        for (middle, taken) in self.map.squares(here.position(), SEEN) {
-            self.ground.see(middle, taken.map(|taken| if taken { Seen::Taken } else { Seen::Free }));
+        for (first, row) in self.map.squares(here.position(), SEEN) {
+            self.ground.see_row(first, row.known, row.free, row.taken);
         }
         self.heard = Some(stamp);
         self.beside = beside(params, ranges);

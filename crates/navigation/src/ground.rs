@@ -168,6 +168,21 @@ impl Ground {
         self.taken.set(cell, seen == Some(Seen::Taken));
     }
 
+    /// Takes over what is known of up to 64 cells in a row, a bit for each: the lowest is that at the point `first`, the next ones follow along x.
+    /// Where a bit of `known` is not set nothing is changed; where it is, but neither of the others, nothing is known any more. A row that is
+    /// not wholly inside the grid is left out.
+    pub fn see_row(&mut self, first: Point, known: u64, free: u64, taken: u64) {
+        let (x, y) = index(first);
+        let last = x.saturating_add(63 - known.leading_zeros() as i32);
+        if known != 0
+            && slot(self.corner, last, y).is_some()
+            && let Some(cell) = slot(self.corner, x, y)
+        {
+            self.free.set_row(cell, known, free);
+            self.taken.set_row(cell, known, taken);
+        }
+    }
+
     /// The robot is here, and knows what is within `near` (m) of it. Returns how much of that was new ground (m²).
     pub fn tread(&mut self, here: Point, near: f64) -> f64 {
         self.follow(here);
@@ -451,6 +466,30 @@ mod tests {
 
     proptest! {
         #![proptest_config(ProptestConfig::with_cases(32))]
+
+        /// A row is seen as its cells are, one by one.
+        #[test]
+        fn rows_are_seen_as_cells_are(
+            rows in proptest::collection::vec(
+                ((-15.0..15.0f64, -15.0..15.0f64), any::<u64>(), any::<u64>(), any::<u64>()), 1..20,
+            ),
+        ) {
+            let (mut ground, mut by_hand) = (Ground::new(), Ground::new());
+            for ((x, y), known, free, taken) in rows {
+                let (x, y) = index(Point::new(x, y));
+                ground.see_row(centre(x, y), known, known & free & !taken, known & taken);
+                let is_inside = slot(by_hand.corner, x + 63 - known.leading_zeros() as i32, y).is_some();
+                for i in (0..64).filter(|i| is_inside && slot(ground.corner, x, y).is_some() && known >> i & 1 == 1) {
+                    let seen = match (free >> i & 1, taken >> i & 1) {
+                        (_, 1) => Some(Seen::Taken),
+                        (1, _) => Some(Seen::Free),
+                        _ => None,
+                    };
+                    by_hand.see(centre(x + i, y), seen);
+                }
+            }
+            prop_assert!(ground.free == by_hand.free && ground.taken == by_hand.taken);
+        }
 
         /// A way never leads where something stands nearer than the least room, but for its first steps.
         #[test]

@@ -31,6 +31,18 @@ impl Layer {
         *word = *word & !(1 << (column % 64)) | u64::from(to) << (column % 64);
     }
 
+    /// Sets 64 cells in a row, from `cell` on around the torus, to what `to` says where `which` is set; a bit for each, the lowest first.
+    pub(crate) fn set_row(&mut self, cell: usize, which: u64, to: u64) {
+        let (row, column) = (cell / SIDE, cell % SIDE);
+        let (word, shift) = (column / 64, column % 64);
+        let row = &mut self.0[row];
+        row[word] = row[word] & !(which << shift) | (to & which) << shift;
+        // What does not fit into the word lies in the next; of a shift by 64 nothing is left.
+        let (which, to) = (which >> 1 >> (63 - shift), (to & which) >> 1 >> (63 - shift));
+        let next = &mut row[(word + 1) % WORDS];
+        *next = *next & !which | to;
+    }
+
     pub(crate) fn is_empty(&self) -> bool {
         self.0.iter().all(|row| row.iter().all(|word| *word == 0))
     }

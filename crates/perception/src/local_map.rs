@@ -22,6 +22,7 @@ use types::geometry::whole;
 use types::{Duration, Point, Pose, Time};
 
 mod cells;
+pub use cells::Squares;
 use cells::{Cells, EVIDENCE, SIDE, SURE};
 
 /// Side of a cell (m). Half the reach of what two readings of one thing differ by, at 1 m.
@@ -151,19 +152,17 @@ impl LocalMap {
             .filter(move |point| point.is_within(reach))
     }
 
-    /// What is known within `reach` (m) of a place on squares of two cells by two: the middle of each, and whether something is surely in it, or
-    /// surely nothing. Squares of which nothing was ever known are left out, and those farther than half the map's width from where the robot was
-    /// at the last reading.
-    pub fn squares(&self, place: Point, reach: f64) -> impl Iterator<Item = (Point, Option<bool>)> + '_ {
-        let reach = reach.clamp(0.0, f64::from(SIDE / 2 - 2) * CELL);
+    /// What is known within `reach` (m, at most 3) of a place on squares of two cells by two, in rows: the middle of the first square of each row,
+    /// the others follow along x. Nothing is known of what is farther than half the map's width from where the robot was at the last
+    /// reading.
+    pub fn squares(&self, place: Point, reach: f64) -> impl Iterator<Item = (Point, Squares)> + '_ {
+        let reach = reach.clamp(0.0, 3.0);
         let half = |i: i32| i.div_euclid(2);
         let ((x, y), span) = (index(place), whole(reach / (2.0 * CELL)));
         let first = 2 * (half(x) - span);
-        (half(y) - span..=half(y) + span).map(|iy| 2 * iy).flat_map(move |iy| {
-            self.cells.squares_in(first, iy, 2 * span + 1).map(move |(column, taken)| {
-                let ix = first + column;
-                (Point::new(f64::from(ix + 1) * CELL, f64::from(iy + 1) * CELL), taken)
-            })
+        (half(y) - span..=half(y) + span).map(move |iy| {
+            let middle = Point::new(f64::from(first + 1) * CELL, f64::from(2 * iy + 1) * CELL);
+            (middle, self.cells.squares_in(first, 2 * iy, 2 * span + 1))
         })
     }
 
@@ -555,7 +554,7 @@ mod tests {
     #[test]
     fn squares_tell_what_is_surely_taken_and_surely_free() {
         let map = along_a_wall();
-        let squares: Vec<_> = map.squares(Point::new(1.0, 0.0), 1.0).collect();
+        let squares = squares(&map, Point::new(1.0, 0.0), 1.0);
         let of = |x: f64, y: f64| {
             let found = squares.iter().find(|(p, _)| (p.x - x).abs() < 0.051 && (p.y - y).abs() < 0.051);
             found.and_then(|(_, taken)| *taken)
@@ -613,6 +612,22 @@ mod tests {
             .collect()
     }
 
+    /// The squares of [`LocalMap::squares`] one by one.
+    fn squares(map: &LocalMap, place: Point, reach: f64) -> Vec<(Point, Option<bool>)> {
+        let rows = map.squares(place, reach);
+        let each = rows.flat_map(|(first, row)| (0..64).map(move |i| (first, row, i)));
+        let known = each.filter(|(_, row, i)| row.known >> i & 1 == 1);
+        let told = known.map(|(first, row, i)| {
+            // It lies where four cells meet.
+            let (ix, iy) = (libm::round(first.x / CELL) as i32, libm::round(first.y / CELL) as i32);
+            let middle = Point::new(f64::from(ix + 2 * i) * CELL, f64::from(iy) * CELL);
+            let (taken, free) = (row.taken >> i & 1 == 1, row.free >> i & 1 == 1);
+            assert!(!(taken && free));
+            (middle, (taken || free).then_some(taken))
+        });
+        told.collect()
+    }
+
     /// What [`LocalMap::squares`] is to give, cell by cell.
     fn squares_by_hand(map: &LocalMap, place: Point, reach: f64) -> Vec<(Point, Option<bool>)> {
         let ((x, y), span) = (index(place), (reach.min(62.0 * CELL) / (2.0 * CELL)).floor() as i32);
@@ -647,7 +662,7 @@ mod tests {
             let reach = reach.min(3.15);
             let found: Vec<Point> = map.around(pose, reach, now, 1).collect();
             prop_assert_eq!(found, around_by_hand(&map, pose, reach, now));
-            let found: Vec<_> = map.squares(pose.position(), reach).collect();
+            let (found, reach) = (squares(&map, pose.position(), reach), reach.min(3.0));
             prop_assert_eq!(found, squares_by_hand(&map, pose.position(), reach));
         }
     }

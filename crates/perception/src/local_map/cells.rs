@@ -167,22 +167,18 @@ impl Cells {
         Columns { left: halves(turned(&self.sure, iy, first) & lowest(count)), first }
     }
 
-    /// What is known of `count` squares of two cells by two (less than half the side) from the one with the lowest cell (`first`, `iy`) on; both
-    /// are even. What is outside the window is not known.
+    /// What is known of `count` squares of two cells by two (no more than 64) from the one with the lowest cell (`first`, `iy`) on; both are
+    /// even. What is outside the window is not known.
     pub(super) fn squares_in(&self, first: i32, iy: i32, count: i32) -> Squares {
-        let rows = |plane: &Plane| {
+        let row = |plane: &Plane| {
             let row =
                 |iy| turned(plane, iy, first) & turned(&self.here, iy, first) & self.window_in(iy, first);
             let both = row(iy) | row(iy + 1);
-            both | both >> 1
+            even_bits(both | both >> 1)
         };
-        /// The left one of each pair of columns.
-        const PAIRS: Row = Row::MAX / 3;
-        Squares {
-            known: halves(rows(&self.known) & PAIRS & lowest(2 * count)),
-            occupied: halves(rows(&self.occupied)),
-            sure: halves(rows(&self.sure)),
-        }
+        let known = row(&self.known) & lowest(count) as u64;
+        let taken = known & row(&self.sure);
+        Squares { known, taken, free: known & !row(&self.occupied) }
     }
 
     /// The columns of row `iy` that are in the window, from column `first` on.
@@ -267,22 +263,41 @@ impl Iterator for Columns {
     }
 }
 
-/// A row of squares of two cells by two, at the bit of its left column each.
-pub(super) struct Squares {
-    known: [u64; 2],
-    occupied: [u64; 2],
-    sure: [u64; 2],
+/// The even bits of a row, packed into a word.
+#[inline]
+fn even_bits(row: Row) -> u64 {
+    /// Of `2 size` bits the lower half.
+    const fn lower(size: u32) -> Row {
+        Row::MAX / ((1 << size) + 1)
+    }
+    // Pairs of bits are drawn together, then pairs of pairs, and so on.
+    [1, 2, 4, 8, 16, 32].into_iter().fold(row & lower(1), |row, size| (row | row >> size) & lower(2 * size))
+        as u64
 }
 
-impl Iterator for Squares {
-    /// The column relative to the first, and whether something is surely in the square, or surely nothing.
-    type Item = (i32, Option<bool>);
+/// A row of squares of two cells by two, a bit for each.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Squares {
+    /// Of which something was ever known.
+    pub known: u64,
+    /// In which something surely stands.
+    pub taken: u64,
+    /// In which surely nothing stands.
+    pub free: u64,
+}
 
-    #[inline]
-    fn next(&mut self) -> Option<(i32, Option<bool>)> {
-        let (half, bit) = take_lowest(&mut self.known)?;
-        let has = |plane: &[u64; 2]| plane[half] >> bit & 1 == 1;
-        let taken = if has(&self.sure) { Some(true) } else { (!has(&self.occupied)).then_some(false) };
-        Some((64 * half as i32 + bit as i32, taken))
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_even_bits_of_a_row_are_packed_in_their_order() {
+        assert_eq!(
+            [even_bits(Row::MAX), even_bits(Row::MAX / 3 * 2), even_bits(1 << 126)],
+            [u64::MAX, 0, 1 << 63]
+        );
+        for bit in 0..128 {
+            assert_eq!(even_bits(1 << bit), if bit % 2 == 0 { 1 << (bit / 2) } else { 0 }, "{bit}");
+        }
     }
 }
