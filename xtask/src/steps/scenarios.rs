@@ -10,8 +10,7 @@ use crate::workspace::Workspace;
 const SCENARIOS: [&str; 2] = ["exploration", "annex"];
 const SEEDS: usize = 10;
 
-/// So many of the seeds must reach the goal; none may touch anything. This holds what is reached, so that it does not get worse;
-/// what is wanted is nearly all of them (see the row N15 of the coverage).
+/// So many of the seeds must reach the goal; none may touch anything.
 const ENOUGH: usize = 9;
 
 pub(super) fn run(workspace: &Workspace) -> Result<Done, Failure> {
