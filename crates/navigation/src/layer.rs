@@ -31,6 +31,14 @@ impl Layer {
         *word = *word & !(1 << (column % 64)) | u64::from(to) << (column % 64);
     }
 
+    /// 64 cells in a row, from `cell` on around the torus; a bit for each, the lowest first.
+    pub(crate) fn row_from(&self, cell: usize) -> u64 {
+        let (row, column) = (&self.0[cell / SIDE], cell % SIDE);
+        let (word, shift) = (column / 64, column % 64);
+        // Of a shift by 64 nothing is left.
+        row[word] >> shift | row[(word + 1) % WORDS] << 1 << (63 - shift)
+    }
+
     /// Sets 64 cells in a row, from `cell` on around the torus, to what `to` says where `which` is set; a bit for each, the lowest first.
     pub(crate) fn set_row(&mut self, cell: usize, which: u64, to: u64) {
         let (row, column) = (cell / SIDE, cell % SIDE);
@@ -166,6 +174,21 @@ mod tests {
                 });
                 prop_assert_eq!(wide.get(cell), near, "cell {}", cell);
             }
+        }
+    }
+
+    #[test]
+    fn a_row_from_any_cell_on_is_what_was_set_there_and_nothing_else() {
+        let bits = 0x8000_0000_dead_0001;
+        for column in [0, 1, 63, 64, 100, 192, 193, 255] {
+            let mut some = Layer::default();
+            some.set_row(5 * SIDE + column, u64::MAX, bits);
+            assert_eq!(some.row_from(5 * SIDE + column), bits, "{column}");
+            let set = (0..SIDE * SIDE).filter(|c| some.get(*c)).count();
+            assert_eq!(set as u32, bits.count_ones(), "{column}");
+            assert!(some.get(5 * SIDE + column) && some.get(5 * SIDE + (column + 63) % SIDE));
+            some.set_row(5 * SIDE + column, 1, 0);
+            assert_eq!(some.row_from(5 * SIDE + column), bits - 1, "{column}");
         }
     }
 

@@ -281,15 +281,21 @@ mod tests {
 
     /// Ten seconds of the scenario with a log; gives the log's bytes.
     fn log_of(seed: u64, folder: &Path) -> Vec<u8> {
-        let registry = with_robots(agents::registry());
-        let scenario = Scenario { file: file::load("exploration", &[], &registry).unwrap(), registry };
-        let ready = scenario.prepare(seed).unwrap();
         let path = folder.join(format!("{seed}.mcap"));
+        log_to(&path, seed, &[], Duration::secs(10));
+        std::fs::read(path).unwrap()
+    }
+
+    /// Runs the exploration as long as that, with these settings, and logs it.
+    fn log_to(path: &Path, seed: u64, sets: &[String], limit: Duration) {
+        let registry = with_robots(agents::registry());
+        let scenario = Scenario { file: file::load("exploration", sets, &registry).unwrap(), registry };
+        let ready = scenario.prepare(seed).unwrap();
         let facts = Facts::default();
         let run = RunInfo { notes: figures::notes(&ready), seed: Some(seed), ..RunInfo::default() };
-        let (log, _) = LogFile::create(&path, &run, 1.0, facts.clone()).unwrap();
+        let (log, _) = LogFile::create(path, &run, 1.0, facts.clone()).unwrap();
         let options = Options {
-            limit: Some(Duration::secs(10)),
+            limit: Some(limit),
             log: choice(&ready, 1.0),
             recorder: Some(Box::new(log)),
             observer: Box::new(Judge::new(&ready, Arc::default(), Some(facts))),
@@ -297,7 +303,25 @@ mod tests {
             ..Options::default()
         };
         Simulation::new(&ready.plan, &ready.registry, options).unwrap().run().unwrap();
-        std::fs::read(path).unwrap()
+    }
+
+    #[test]
+    fn pictures_of_any_size_are_logged_whole() {
+        let path = std::env::temp_dir().join(format!("sinew-picture-{}.mcap", std::process::id()));
+        let sets = ["robot.h1.camera.width=640", "robot.h1.camera.height=480"].map(str::to_owned);
+        log_to(&path, 1, &sets, Duration::millis(200));
+        let mut reader = Reader::open(&path).unwrap();
+        let mut pictures = Vec::new();
+        while let Some(message) = reader.next_message().unwrap() {
+            if message.channel.topic == "/h1/image/compressed" {
+                pictures.push(message.cdr.clone());
+            }
+        }
+        std::fs::remove_file(&path).unwrap();
+        assert_eq!(pictures.len(), 1);
+        // The header of a PNG holds width and height, most significant byte first.
+        let png = pictures[0].windows(4).position(|four| four == b"IHDR").unwrap();
+        assert_eq!(pictures[0][png + 4..png + 12], [0, 0, 2, 128, 0, 0, 1, 224]);
     }
 
     #[test]
