@@ -632,6 +632,79 @@ mod tests {
         assert!(driven.nearest > 0.25, "{}", driven.nearest);
     }
 
+    /// On the way out of a known room, to what is free beyond its door.
+    fn on_the_way_out() -> (Driven, Vec<Point>) {
+        let world = room();
+        let mut driven = at_start(Parameters::new(0.225), Pose::new(1.0, 1.0, 0.0));
+        for i in 0..99 {
+            driven
+                .ground
+                .tread(Point::new(0.5 + 0.4 * f64::from(i % 11), 0.4 + 0.4 * f64::from(i / 11)), 0.9);
+        }
+        for i in 0..400 {
+            let beyond = Point::new(2.45 + 0.1 * f64::from(i % 20), 4.15 + 0.1 * f64::from(i / 20));
+            driven.ground.see(beyond, Some(Seen::Free));
+        }
+        driven.go(&world, 20.0, |roamer, _| roamer.mode == Mode::Leaving);
+        (driven, world)
+    }
+
+    /// Goes on for so long with a door in which something seems to stand; tells where it then goes to.
+    fn with_a_closed_door(driven: &mut Driven, world: &[Point], seconds: f64) -> Option<Point> {
+        let mut closed = world.to_vec();
+        closed.extend(wall((3.0, 4.0), (3.9, 4.0)));
+        for point in &closed {
+            driven.ground.see(*point, Some(Seen::Taken));
+        }
+        driven.go(world, seconds, |_, _| false);
+        driven.roamer.way.map(|way| way.goal())
+    }
+
+    #[test]
+    fn a_way_that_is_lost_from_sight_is_gone_on_with_for_a_while() {
+        let (mut driven, world) = on_the_way_out();
+        let goal = driven.roamer.way.map(|way| way.goal());
+        assert!(driven.roamer.mode == Mode::Leaving && goal.is_some_and(|goal| goal.y > 4.0), "{goal:?}");
+        assert_eq!(with_a_closed_door(&mut driven, &world, 3.0), goal);
+        assert_ne!(with_a_closed_door(&mut driven, &world, 6.0), goal);
+    }
+
+    #[test]
+    fn where_it_does_not_get_on_it_looks_then_goes_around_and_at_last_gives_up() {
+        let (Driven { mut pose, mut roamer, mut ground, .. }, mut world) = on_the_way_out();
+        let goal = roamer.way.map(|way| way.goal()).unwrap();
+        // What it sees stands in the door; the ground does not know of it.
+        world.extend(wall((3.0, 4.0), (3.9, 4.0)));
+        let (mut blocked, mut looked, mut turned_away, mut seconds) = (0.0, true, false, 0.0);
+        while !ground.is_known(goal) && seconds < 120.0 {
+            let inverse = pose.inverse();
+            let seen = world.iter().map(|p| inverse.transform(*p)).filter(|p| p.norm() < 2.0);
+            let twist = roamer.step(seen, Beside::default(), pose, &mut ground, 0.2);
+            pose = pose.along_arc(0.2 * twist.linear, 0.2 * twist.angular);
+            seconds += 0.2;
+            if pose.y > 3.0 {
+                blocked += 0.2;
+                let away = fabs(wrap((goal - pose.position()).bearing() - pose.heading)) > 1.2;
+                looked &= blocked > LOOKS || !away;
+                turned_away |= away;
+            }
+        }
+        assert!(ground.is_known(goal) && pose.y < 4.0, "{pose:?} after {seconds} s");
+        assert!(looked && turned_away, "{looked} {turned_away}");
+    }
+
+    #[test]
+    fn a_place_that_was_given_up_is_tried_again() {
+        let place = Point::new(3.0, 0.0);
+        let mut driven = at_start(Parameters::new(0.225), Pose::default());
+        driven.ground.give_up(place, 0.5);
+        let walls = square((0.0, 0.0), 0.6);
+        driven.go(&walls, TRIES_AGAIN - 1.0, |_, _| false);
+        assert!(driven.ground.is_known(place));
+        driven.go(&walls, 2.0, |_, _| false);
+        assert!(!driven.ground.is_known(place));
+    }
+
     #[test]
     fn all_around_closed_it_looks_around_and_does_not_move() {
         let start = Pose::new(0.0, 0.0, 0.0);
