@@ -5,7 +5,7 @@
 //! | `ls` | `system`, `time_s`, `agents`: rows of `name`, `kind`, `state` (`running`, `restarting`, `dead`), `executor`, `asked`, `granted`, `period_s` (null without one), `deadline_s`, the counts, `last_death` (null when it never died), `params` |
 //! | `graph` | `system`, `time_s`, `agents`: rows of `name`, `kind`, `doc`, `executor`, `ports`: rows of `name`, `doc`, `direction` (`input`, `output`, `service`, `client`), `message`, `sent`; `wires`: rows of `from`, `to`, `message`, `depth`, `overload`, `filter`, `sent`, `taken`, `dropped`, `refused`, `expired` |
 //! | `top` | `system`, `time_s`, `messages`: `sent`, `taken`, `dropped`, `refused`, `expired` over all wires; `agents`: rows of `name`, `state`, `executor`, `asked`, `granted`, the counts, and the figures `exec`, `jitter`, `response` |
-//! | counts | `releases`, `missed`, `stalled`, `skipped`, `faults`, `panics`, `hangs`, `restarts`; of execution times `left_out` (a stall was in the step), `checked` (held against the clock of the thread) and `disagreed` |
+//! | counts | `releases`, `missed`, `stalled`, `skipped`, `faults`, `panics`, `hangs`, `restarts`; of execution times `left_out` (a stall was in the step), `checked` (held against the clock of the thread) and `disagreed`; `allocations` (how often steps took or freed memory, where the program watches that) |
 //! | figure | `name`, `unit`, `n`, `min`, `p50`, `p99`, `p999`, `max`: unfiltered; all values null while `n` is 0 |
 //! | filter | `category` (null for all), `priority` (the least), `marker`, `recipient` (the name of an agent, null for all), `every` |
 //!
@@ -103,6 +103,7 @@ fn with_counts(mut row: Json, agent: &AgentView) -> Json {
         ("left_out", counts.left_out),
         ("checked", counts.checked),
         ("disagreed", counts.disagreed),
+        ("allocations", counts.allocations),
     ] {
         row[key] = count.into();
     }

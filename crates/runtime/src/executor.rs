@@ -16,12 +16,13 @@ use std::sync::Arc;
 use types::{AgentId, Duration, Name, Time};
 
 use crate::agent::{Body, Fault, Step};
+use crate::allocations;
 use crate::context::{Context, ReadySet};
 use crate::door::{CHANGES, Door};
 use crate::os;
 use crate::port::{Envelope, InputEnd, OutputEnd, WireId};
 use crate::processor::{Checks, Reading, Stopwatch, agrees};
-use crate::stats::{AgentStats, bump, nanos};
+use crate::stats::{AgentStats, bump, bump_by, nanos};
 
 /// When an agent runs.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -153,6 +154,11 @@ pub(crate) enum Change {
         slot: u32,
         fault: StepFault,
     },
+    /// Makes an output misbehave, or behave again.
+    OutputFault {
+        end: Arc<dyn OutputEnd>,
+        faulty: Box<dyn Any + Send>,
+    },
     /// Sends a message that comes from outside, on the thread that owns the routes.
     Send {
         end: Arc<dyn OutputEnd>,
@@ -191,6 +197,8 @@ pub(crate) struct Running {
     pub limit: AtomicU64,
     /// Counts steps, so that two of the same agent are told apart.
     pub steps: AtomicU64,
+    /// How often the executor itself took or freed memory, between and around the steps of its agents.
+    pub allocations: AtomicU64,
 }
 
 /// The time of a step.
@@ -201,6 +209,8 @@ struct Spent {
     others: u64,
     /// What the thread's clock says (ns), where it was asked.
     thread: Option<u64>,
+    /// How often it took or freed memory.
+    allocations: u64,
 }
 
 /// An agent that is to run, and why.
@@ -236,6 +246,7 @@ pub(crate) struct Link {
     pub changes: rtrb::Producer<Change>,
     pub answers: rtrb::Consumer<Answer>,
     pub door: Arc<Door>,
+    pub running: Arc<Running>,
 }
 
 /// How many changes or answers can be under way.
@@ -268,14 +279,14 @@ impl Core {
             due: BinaryHeap::new(),
             cursor: 0,
             door: door.clone(),
-            running,
+            running: running.clone(),
             changes,
             answers,
             nanos_per_tick: os::nanos_per_tick(),
             checks: Checks::default(),
             stalls: 0,
         };
-        (core, Link { changes: change_in, answers: answer_out, door })
+        (core, Link { changes: change_in, answers: answer_out, door, running })
     }
 
     /// When the next agent is due by the clock.
@@ -414,6 +425,7 @@ impl Core {
         still_mine: impl FnOnce() -> bool,
     ) -> Option<Ended> {
         let read = || watch.map_or_else(Reading::of_time, Stopwatch::read);
+        let entered = allocations::so_far();
         let (body, mut step, checked, begun) = {
             // SAFETY: the caller owns the core; this borrow ends before the step.
             let core = unsafe { &mut *core };
@@ -467,6 +479,9 @@ impl Core {
         // SAFETY: as above. The figures are shared with the watchdog's side and outlive the core, whoever has it.
         let running = unsafe { &*Arc::as_ptr(&(*core).running) };
         let mut body = Some(body);
+        let before = allocations::so_far();
+        // A step that panics takes memory for that, and a start may; neither counts.
+        let mut in_step = 0;
         let result = catch_unwind(AssertUnwindSafe(|| {
             if panics {
                 panic!("asked to panic");
@@ -475,8 +490,12 @@ impl Core {
             if first {
                 body.start(&mut step)?;
             }
-            body.step(&mut step)
+            let before = allocations::so_far();
+            let result = body.step(&mut step);
+            in_step = allocations::so_far() - before;
+            result
         }));
+        let after = allocations::so_far();
         let ended = read();
         // First the step is published as ended, then it is asked whose the core is: the watchdog does it the other way round,
         // with a barrier on all processors between, so that one of the two sees the other.
@@ -492,9 +511,11 @@ impl Core {
             elapsed: begun.elapsed(&ended),
             others: begun.others(&ended),
             thread: checked.map(|before| os::thread_time().saturating_sub(before)),
+            allocations: in_step,
         };
         let alarm = context.end();
         core.end(context, job, now, result, body, alarm, taken, spent, watch);
+        core.note_allocations((before - entered) + (allocations::so_far() - after));
         Some(Ended::Normally)
     }
 
@@ -531,6 +552,9 @@ impl Core {
             if let Some(used) = spent.thread {
                 seat.stats.check(agrees(own, used));
             }
+        }
+        if spent.allocations > 0 {
+            bump_by(&seat.stats.allocations, spent.allocations);
         }
         seat.stats.response.add(nanos(end - job.release));
         if end > job.deadline {
@@ -587,11 +611,23 @@ impl Core {
     pub(crate) fn serve_changes(&mut self, context: &Context, now: Time) {
         while !self.answers.is_full() {
             let Ok(mut change) = self.changes.pop() else { return };
+            let before = allocations::so_far();
             let done = self.commit(&mut change, context, now);
+            // An agent that is stopped may free what it likes.
+            if !matches!(change, Change::Stop | Change::Unseat { .. }) {
+                self.note_allocations(allocations::so_far() - before);
+            }
             let answer = if done { Answer::Done(change) } else { Answer::NotDrained(change) };
             if let Err(rtrb::PushError::Full(lost)) = self.answers.push(answer) {
                 std::mem::forget(lost);
             }
+        }
+    }
+
+    #[inline]
+    fn note_allocations(&self, count: u64) {
+        if count > 0 {
+            bump_by(&self.running.allocations, count);
         }
     }
 
@@ -688,6 +724,7 @@ impl Core {
                     seat.fault = *fault;
                 }
             }
+            Change::OutputFault { end, faulty } => end.set_fault(faulty.as_mut()),
             Change::Send { end, message, envelope } => {
                 context.begin(AgentId::NONE, now, self.number, &*self.ready);
                 end.send_prepared(envelope, message.as_ref());

@@ -51,6 +51,7 @@
 //! ```
 
 mod agent;
+mod allocations;
 mod check;
 mod context;
 mod door;
@@ -81,6 +82,7 @@ pub use agent::{
     Agent, AgentType, ClientEnd, Declare, Fault, InputEnd, NoParams, OutputEnd, PortInfo, Registry,
     ServiceEnd, Step,
 };
+pub use allocations::Watched;
 pub use check::{check, executors_of, wires_of};
 pub use executor::{Cause, StepFault};
 pub use folder::{FolderError, RunFolder};
@@ -96,7 +98,7 @@ pub use port::{
     Received, Sent, WireCounts, WireId,
 };
 pub use request::{
-    AgentState, AgentView, Counts, FaultKind, PortView, Refusal, Request, SystemView, WireView,
+    AgentState, AgentView, Counts, ExecutorView, FaultKind, PortView, Refusal, Request, SystemView, WireView,
 };
 pub use ring::{MOST_MESSAGES, Overload};
 pub use router::{Incident, ServiceShape, robot_wires};

@@ -75,7 +75,6 @@ pub(crate) struct Writer<T: Message> {
     waiting: std::collections::VecDeque<u32>,
     history: std::collections::VecDeque<u32>,
     next: u64,
-    rows: usize,
 }
 
 /// A reader's place.
@@ -110,13 +109,7 @@ pub(crate) fn memory<T: Message>(form: Form) -> Writer<T> {
     let shared = Arc::new(Shared { slots, recent, published: AtomicU64::new(0) });
     let mut waiting = std::collections::VecDeque::with_capacity(n);
     waiting.extend(0..n as u32);
-    Writer {
-        shared,
-        waiting,
-        history: std::collections::VecDeque::with_capacity(history + 1),
-        next: 0,
-        rows: form.rows,
-    }
+    Writer { shared, waiting, history: std::collections::VecDeque::with_capacity(history + 1), next: 0 }
 }
 
 /// A slot that is being filled.
@@ -135,11 +128,6 @@ impl<T: Message> Writer<T> {
     /// How many readers can be seated.
     pub(crate) fn seats(&self) -> usize {
         (self.shared.slots.len() - 1 - self.history()) / HELD_BY_A_SEAT
-    }
-
-    /// The greatest length of a row.
-    pub(crate) fn rows(&self) -> usize {
-        self.rows
     }
 
     pub(crate) fn shared(&self) -> Arc<Shared<T>> {

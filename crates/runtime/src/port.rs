@@ -3,6 +3,7 @@
 //! What an agent holds is a handle. The mailbox and the routes behind it belong to the router: they outlive the agent, and its
 //! successor takes them over.
 
+mod faulty;
 mod input;
 mod output;
 
@@ -205,8 +206,10 @@ pub(crate) trait OutputEnd: Any + Send + Sync {
     fn set_log(&self, number: u32, every: u32);
     /// Messages sent since the start, whoever listens.
     fn sent(&self) -> u64;
-    /// Makes the output misbehave, or behave again.
-    fn set_fault(&self, fault: OutputFault);
+    /// What it takes to make the output misbehave, or behave again.
+    fn prepare_fault(&self, fault: OutputFault) -> Box<dyn Any + Send>;
+    /// Makes it so. What it kept before goes back, to be freed elsewhere.
+    fn set_fault(&self, faulty: &mut (dyn Any + Send));
     /// Reads a message from CDR, to be sent with [`send_prepared`](Self::send_prepared).
     fn prepare_message(&self, bytes: &[u8]) -> Result<Box<dyn Any + Send>, types::cdr::Error>;
     /// Sends a message that was prepared by an output of the same type.

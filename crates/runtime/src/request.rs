@@ -288,6 +288,8 @@ pub struct Counts {
     pub checked: u64,
     /// Of those, the ones for which it said something else.
     pub disagreed: u64,
+    /// How often its steps took or freed memory; zero where nobody watches that.
+    pub allocations: u64,
 }
 
 /// What a running system says of a port.
@@ -332,6 +334,17 @@ pub struct WireView {
     pub expired: u64,
 }
 
+/// What a running system says of an executor.
+#[derive(Clone, Debug)]
+pub struct ExecutorView {
+    /// Its name.
+    pub name: String,
+    /// Whether it is to run in real time.
+    pub real_time: bool,
+    /// How often it took or freed memory besides the steps of its agents; zero where nobody watches that.
+    pub allocations: u64,
+}
+
 /// What a running system says of itself.
 #[derive(Clone, Debug)]
 pub struct SystemView {
@@ -339,6 +352,10 @@ pub struct SystemView {
     pub name: String,
     /// The time on its clock.
     pub now: Time,
+    /// Its executors.
+    pub executors: Vec<ExecutorView>,
+    /// Whether it is known who takes memory: the program stands on [`Watched`](crate::Watched).
+    pub allocations_watched: bool,
     /// Its agents.
     pub agents: Vec<AgentView>,
     /// Its wires.

@@ -20,7 +20,7 @@ use crate::executor::{Answer, Change, Link, Seat, Timing, heaps_for};
 use crate::log::{LogChoice, LogShared};
 use crate::names::Directory;
 use crate::plan::{AgentPlan, ExecutorPlan, WireFilter, WirePlan};
-use crate::port::{Direction, Envelope, OutputEnd, PortEnds, WireCounts, WireId};
+use crate::port::{Direction, Envelope, OutputEnd, OutputFault, PortEnds, WireCounts, WireId};
 use crate::request::{AgentState, FaultKind, Refusal, Request};
 use crate::ring::Overload;
 use crate::stats::AgentStats;
@@ -606,30 +606,23 @@ impl Router {
     fn fault(&mut self, target: &str, fault: FaultKind, fabric: &mut dyn Fabric) -> Reply<()> {
         if let Ok(at) = self.index(target) {
             let known = &self.agents[at];
-            if let Some(step) = fault.of_step() {
-                let (executor, slot) = (known.executor, known.slot);
-                if fault == FaultKind::Ok {
-                    known
-                        .ends
-                        .iter()
-                        .filter_map(|end| end.output.as_ref())
-                        .for_each(|o| o.set_fault(Default::default()));
+            let (executor, slot) = (known.executor, known.slot);
+            let step = fault.of_step();
+            if step.is_none() || fault == FaultKind::Ok {
+                let output = fault.of_output().unwrap_or_default();
+                let ends: Vec<_> = known.ends.iter().filter_map(|end| end.output.clone()).collect();
+                for end in ends {
+                    self.output_fault(executor, end, output, fabric)?;
                 }
-                return self.commit(executor, Change::Fault { slot, fault: step }, fabric);
             }
-            let output = fault.of_output().unwrap_or_default();
-            known.ends.iter().filter_map(|end| end.output.as_ref()).for_each(|end| end.set_fault(output));
-            return Ok(());
+            return step.map_or(Ok(()), |fault| self.commit(executor, Change::Fault { slot, fault }, fabric));
         }
         let (agent, port) = self.port(target).map_err(|refusal| {
             if target.contains('.') { refusal } else { self.index(target).err().unwrap_or(refusal) }
         })?;
         let end = self.agents[agent].ends[port].output.clone();
         match (end, fault.of_output()) {
-            (Some(end), Some(fault)) => {
-                end.set_fault(fault);
-                Ok(())
-            }
+            (Some(end), Some(fault)) => self.output_fault(self.agents[agent].executor, end, fault, fabric),
             (None, _) => {
                 Err(Refusal::new(format!("{target} sends nothing")).help("name an output, or the agent"))
             }
@@ -637,6 +630,17 @@ impl Router {
                 Err(Refusal::new(format!("an output cannot {}", fault.name())).help("name the agent"))
             }
         }
+    }
+
+    fn output_fault(
+        &mut self,
+        executor: usize,
+        end: Arc<dyn OutputEnd>,
+        fault: OutputFault,
+        fabric: &mut dyn Fabric,
+    ) -> Reply<()> {
+        let faulty = end.prepare_fault(fault);
+        self.commit(executor, Change::OutputFault { end, faulty }, fabric)
     }
 
     fn send(&mut self, port: &str, bytes: &[u8], fabric: &mut dyn Fabric) -> Reply<()> {

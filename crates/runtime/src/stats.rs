@@ -152,6 +152,8 @@ pub struct AgentStats {
     pub checked: AtomicU64,
     /// Of those, the ones for which it said something else.
     pub disagreed: AtomicU64,
+    /// How often its steps took or freed memory.
+    pub allocations: AtomicU64,
     /// How long steps used their processor (ns): on the wall clock without what higher executors took from them.
     pub exec: Histogram,
     /// How late steps began (ns).
@@ -174,7 +176,13 @@ impl AgentStats {
 /// Adds one to a counter that one thread writes.
 #[inline]
 pub(crate) fn bump(counter: &AtomicU64) {
-    counter.store(counter.load(Relaxed) + 1, Relaxed);
+    bump_by(counter, 1);
+}
+
+/// Adds to a counter that one thread writes.
+#[inline]
+pub(crate) fn bump_by(counter: &AtomicU64, count: u64) {
+    counter.store(counter.load(Relaxed) + count, Relaxed);
 }
 
 /// A span that is not negative, in nanoseconds.

@@ -1,8 +1,9 @@
 //! What a run comes to, for people and for programs.
 
+use std::collections::BTreeMap;
 use std::path::PathBuf;
 
-use runtime::{AgentView, CannotRun, Figure, Incident, Report};
+use runtime::{AgentView, CannotRun, Figure, Incident, Report, SystemView};
 use serde_json::{Value as Json, json};
 use types::{Duration, Time};
 
@@ -47,6 +48,8 @@ pub(crate) struct Summary {
     pub(crate) dropped: u64,
     pub(crate) refused: u64,
     pub(crate) log_dropped: u64,
+    /// Who took or freed memory in real time, and how often; nothing where nobody watched.
+    pub(crate) allocations: Option<Vec<(String, u64)>>,
     pub(crate) incidents: Vec<Incident>,
     /// When the run began on its own clock.
     pub(crate) begun: Time,
@@ -100,6 +103,7 @@ impl Summary {
             dropped: wires.iter().map(|wire| wire.dropped + wire.expired).sum(),
             refused: wires.iter().map(|wire| wire.refused).sum(),
             log_dropped: report.log_dropped,
+            allocations: allocations(&report.view),
             incidents: report.incidents,
             begun: Time(report.view.now.0 - report.time.0),
             agents: report.view.agents,
@@ -167,6 +171,10 @@ impl Summary {
                 "stalled": self.count(|agent| agent.counts.stalled),
             },
             "messages": {"sent": self.sent, "dropped": self.dropped, "refused": self.refused},
+            "allocations": self.allocations.as_ref().map(|by| json!({
+                "real_time": by.iter().map(|(_, count)| count).sum::<u64>(),
+                "by": by.iter().cloned().collect::<BTreeMap<String, u64>>(),
+            })),
             "agents": agents,
             "robots": robots,
             "incidents": incidents.collect::<Vec<_>>(),
@@ -211,6 +219,9 @@ impl Summary {
         }
         line(format!("  deadlines    {}", self.deadlines()));
         line(format!("  messages     {}", self.messages()));
+        if let Some(text) = self.memory() {
+            line(format!("  memory       {text}"));
+        }
         for text in self.told() {
             line(format!("  happened     {text}"));
         }
@@ -271,6 +282,16 @@ impl Summary {
         text
     }
 
+    /// Who took memory where there is no time for it.
+    fn memory(&self) -> Option<String> {
+        let by = self.allocations.as_ref()?;
+        if by.is_empty() {
+            return Some("no real-time step took or freed any".into());
+        }
+        let each: Vec<String> = by.iter().map(|(name, count)| format!("{name} {count} times")).collect();
+        Some(format!("taken or freed in real time: {}", each.join(", ")))
+    }
+
     /// What the supervisor did, in sentences; a death and the start after it are one.
     fn told(&self) -> Vec<String> {
         let mut told = Vec::new();
@@ -324,6 +345,16 @@ impl Summary {
         }
         text
     }
+}
+
+/// The agents and executors that took or freed memory in real time, and how often.
+fn allocations(view: &SystemView) -> Option<Vec<(String, u64)>> {
+    let real_time = |name: &str| view.executors.iter().any(|known| known.name == name && known.real_time);
+    let agents = view.agents.iter().filter(|agent| real_time(&agent.executor));
+    let agents = agents.map(|agent| (agent.name.clone(), agent.counts.allocations));
+    let executors = view.executors.iter().filter(|executor| executor.real_time);
+    let executors = executors.map(|known| (format!("executor {}", known.name), known.allocations));
+    view.allocations_watched.then(|| agents.chain(executors).filter(|(_, count)| *count > 0).collect())
 }
 
 /// An incident in a sentence.
@@ -400,6 +431,7 @@ fn agent_json(agent: &AgentView) -> Json {
         "skipped": agent.counts.skipped,
         "restarts": agent.counts.restarts,
         "left_out": agent.counts.left_out,
+        "allocations": agent.counts.allocations,
         "checked": agent.counts.checked,
         "disagreed": agent.counts.disagreed,
         "exec": figure_json("exec", &agent.exec),

@@ -5,7 +5,6 @@
 use core::sync::atomic::{AtomicU64, Ordering};
 use std::any::Any;
 use std::cell::UnsafeCell;
-use std::collections::VecDeque;
 use std::sync::Arc;
 
 use types::cdr::NoElement;
@@ -13,6 +12,7 @@ use types::chance::Stream;
 use types::message::is_large;
 use types::{AgentId, Category, Filter, Header, Message, Priority, Time};
 
+use super::faulty::Faulty;
 use super::input::{Lane, NewLanes, Source};
 use super::{
     Direction, InputEnd, NoSeat, OutputEnd, OutputFault, Parcel, Port, PortEnds, PortOptions, PortShape,
@@ -45,17 +45,19 @@ struct OutputInner<T: Message> {
     sequence: u64,
     routes: Vec<Route<T>>,
     memory: Option<memory::Writer<T>>,
-    /// What a fault keeps of the messages before: the first one, or those that are late.
-    kept: VecDeque<(T, Vec<T::Element>, Time)>,
-    kept_for: u64,
+    /// How it misbehaves, if it does.
+    faulty: Option<Box<Faulty<T>>>,
 }
 
 /// The routes behind an output.
 pub(crate) struct OutputCore<T: Message> {
     inner: UnsafeCell<OutputInner<T>>,
+    /// What the readers of its memory share, and on how many seats: the memory of an output is never replaced.
+    shared: Option<(Arc<memory::Shared<T>>, usize)>,
+    /// The greatest length of the row of a message.
+    rows: usize,
     log_number: AtomicU64,
     log_every: AtomicU64,
-    fault: AtomicU64,
     sent: AtomicU64,
 }
 
@@ -85,9 +87,7 @@ impl<T: Message> OutputEnd for OutputCore<T> {
         routes: usize,
         lanes: usize,
     ) -> Result<PreparedWire, NoSeat> {
-        // The memory itself is never replaced, and sharing it is not touching it.
-        let shared = self.inner().memory.as_ref().map(|memory| (memory.shared(), memory.seats()));
-        if let Some((_, seats)) = &shared
+        if let Some((_, seats)) = &self.shared
             && routes >= *seats
         {
             return Err(NoSeat { seats: *seats });
@@ -95,7 +95,7 @@ impl<T: Message> OutputEnd for OutputCore<T> {
         let displaces = spec.overload == Overload::NewestWins;
         let (mut values, mut links, mut new_lanes) = (Vec::new(), Vec::new(), Vec::new());
         for priority in priorities {
-            let source = match &shared {
+            let source = match &self.shared {
                 None => {
                     let (sender, receiver) = ring::ring(spec.depth, displaces);
                     values.push((*priority, sender));
@@ -160,10 +160,15 @@ impl<T: Message> OutputEnd for OutputCore<T> {
         self.sent.load(Ordering::Relaxed)
     }
 
-    fn set_fault(&self, fault: OutputFault) {
-        // Each request has a number of its own, so that what the fault before it kept is known to be old.
-        let before = self.fault.load(Ordering::Relaxed) >> 8;
-        self.fault.store((before + 1) << 8 | fault as u64, Ordering::Relaxed);
+    fn prepare_fault(&self, fault: OutputFault) -> Box<dyn Any + Send> {
+        let faulty = (fault != OutputFault::None).then(|| Box::new(Faulty::<T>::new(fault, self.rows)));
+        Box::new(faulty)
+    }
+
+    fn set_fault(&self, faulty: &mut (dyn Any + Send)) {
+        if let Some(faulty) = faulty.downcast_mut::<Option<Box<Faulty<T>>>>() {
+            core::mem::swap(&mut self.inner().faulty, faulty);
+        }
     }
 
     fn prepare_message(&self, bytes: &[u8]) -> Result<Box<dyn Any + Send>, types::cdr::Error> {
@@ -214,9 +219,6 @@ impl Default for Envelope {
         }
     }
 }
-
-/// How many messages late those of an output come that was made to delay them.
-const MESSAGES_LATE: usize = 3;
 
 /// What became of a message, wire by wire.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -317,10 +319,7 @@ impl<T: Message> Output<T> {
 
     /// The greatest length of the row of a message.
     pub fn row_capacity(&self) -> usize {
-        self.core
-            .as_ref()
-            .and_then(|core| core.inner().memory.as_ref().map(memory::Writer::rows))
-            .unwrap_or(0)
+        self.core.as_ref().map_or(0, |core| core.rows)
     }
 }
 
@@ -341,7 +340,7 @@ impl<T: Message> OutputCore<T> {
         };
         inner.sequence += 1;
         self.sent.store(inner.sequence, Ordering::Relaxed);
-        if self.fault.load(Ordering::Relaxed) & 0xff != OutputFault::None as u64 {
+        if inner.faulty.is_some() {
             return self.send_faulty(inner, &header, fill);
         }
         match &mut inner.memory {
@@ -432,58 +431,25 @@ impl<T: Message> OutputCore<T> {
         header: &Header,
         fill: impl FnOnce(&mut T, &mut [T::Element]) -> usize,
     ) -> Sent {
-        let word = self.fault.load(Ordering::Relaxed);
-        if word != inner.kept_for {
-            inner.kept.clear();
-            inner.kept_for = word;
-        }
-        let fault = word & 0xff;
         // A pure function of the message's number: the same run misbehaves in the same way.
         let draws = Stream::new(0, "output fault").sample(inner.sender.0.into()).sample(header.sequence);
-        if fault == OutputFault::Off as u64
-            || (fault == OutputFault::Intermittent as u64 && draws.uniform(0) < 0.5)
-        {
-            return Sent::default();
+        let Some(mut faulty) = inner.faulty.take() else { return Sent::default() };
+        let mut sent = Sent::default();
+        if let Some(kept) = faulty.in_place_of(header.stamp, draws, fill) {
+            let header = Header { stamp: kept.stamp, ..*header };
+            let put = |place: &mut T, room: &mut [T::Element]| {
+                *place = kept.head;
+                let len = kept.row().len().min(room.len());
+                room[..len].copy_from_slice(&kept.row()[..len]);
+                len
+            };
+            sent = match inner.memory {
+                Some(_) => self.send_link(inner, &header, put),
+                None => self.send_value(inner, &header, put),
+            };
         }
-        let rows = inner.memory.as_ref().map_or(0, memory::Writer::rows);
-        let mut head = T::default();
-        let mut row = vec![T::Element::default(); rows];
-        let len = fill(&mut head, &mut row).min(rows);
-        row.truncate(len);
-        let mut header = *header;
-        if fault == OutputFault::Stuck as u64 {
-            if inner.kept.is_empty() {
-                inner.kept.push_back((head, row.clone(), header.stamp));
-            }
-            if let Some((first, first_row, _)) = inner.kept.front() {
-                (head, row) = (*first, first_row.clone());
-            }
-        } else if fault == OutputFault::Delayed as u64 {
-            inner.kept.push_back((head, row, header.stamp));
-            if inner.kept.len() <= MESSAGES_LATE {
-                return Sent::default();
-            }
-            let Some((old, old_row, stamp)) = inner.kept.pop_front() else { return Sent::default() };
-            (head, row, header.stamp) = (old, old_row, stamp);
-        } else if fault == OutputFault::Garbage as u64 || fault == OutputFault::Wrong as u64 {
-            let wild = fault == OutputFault::Garbage as u64;
-            let mut number = 0;
-            head.disturb(&mut row, wild, &mut || {
-                number += 1;
-                draws.uniform(number)
-            });
-        }
-        let put = |place: &mut T, room: &mut [T::Element]| {
-            *place = head;
-            let len = row.len().min(room.len());
-            room[..len].copy_from_slice(&row[..len]);
-            len
-        };
-        if inner.memory.is_some() {
-            self.send_link(inner, &header, put)
-        } else {
-            self.send_value(inner, &header, put)
-        }
+        inner.faulty = Some(faulty);
+        sent
     }
 }
 
@@ -561,19 +527,21 @@ fn lane_for<P>(
 pub(crate) fn output_core<T: Message>(options: &PortOptions, seats: usize) -> Arc<OutputCore<T>> {
     let large = is_large::<T>();
     let history = if large { options.history.max(4) } else { options.history };
-    let memory = (history > 0).then(|| memory::memory(memory::Form { history, seats, rows: options.rows }));
+    let rows = if history > 0 { options.rows } else { 0 };
+    let memory = (history > 0).then(|| memory::memory(memory::Form { history, seats, rows }));
+    let shared = memory.as_ref().map(|memory| (memory.shared(), memory.seats()));
     Arc::new(OutputCore {
         inner: UnsafeCell::new(OutputInner {
             sender: AgentId::NONE,
             sequence: 0,
             routes: Vec::new(),
             memory,
-            kept: VecDeque::new(),
-            kept_for: 0,
+            faulty: None,
         }),
+        shared,
+        rows,
         log_number: AtomicU64::new(u64::from(u32::MAX)),
         log_every: AtomicU64::new(0),
-        fault: AtomicU64::new(0),
         sent: AtomicU64::new(0),
     })
 }

@@ -5,7 +5,8 @@ use core::sync::atomic::Ordering::Relaxed;
 use types::{Duration, Time};
 
 use super::{Known, Router, Wire};
-use crate::request::{AgentView, Counts, PortView, SystemView, WireView};
+use crate::allocations;
+use crate::request::{AgentView, Counts, ExecutorView, PortView, SystemView, WireView};
 
 impl Router {
     /// What there is, as people ask for it.
@@ -13,7 +14,19 @@ impl Router {
         let agents = self.agents.iter().map(|known| self.view_agent(known)).collect();
         let wires =
             self.wires.iter().filter(|wire| !wire.is_answer).map(|wire| self.view_wire(wire)).collect();
-        SystemView { name: self.name.clone(), now, agents, wires }
+        let executors = self.executors.iter().map(|executor| ExecutorView {
+            name: executor.plan.name.clone(),
+            real_time: executor.plan.priority.is_some(),
+            allocations: executor.link.running.allocations.load(Relaxed),
+        });
+        SystemView {
+            name: self.name.clone(),
+            now,
+            executors: executors.collect(),
+            allocations_watched: allocations::are_watched(),
+            agents,
+            wires,
+        }
     }
 
     pub(super) fn view_agent(&self, known: &Known) -> AgentView {
@@ -53,6 +66,7 @@ impl Router {
                 left_out: stats.left_out.load(Relaxed),
                 checked: stats.checked.load(Relaxed),
                 disagreed: stats.disagreed.load(Relaxed),
+                allocations: stats.allocations.load(Relaxed),
             },
             exec: stats.exec.figure(),
             jitter: stats.jitter.figure(),
