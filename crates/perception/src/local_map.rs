@@ -22,8 +22,10 @@ use types::geometry::whole;
 use types::{Duration, Point, Pose, Time};
 
 mod cells;
+mod cone;
 pub use cells::Squares;
 use cells::{Cells, EVIDENCE, SIDE, SURE};
+use cone::Cone;
 
 /// Side of a cell (m). Half the reach of what two readings of one thing differ by, at 1 m.
 pub const CELL: f64 = 0.05;
@@ -140,14 +142,17 @@ impl LocalMap {
         let oldest = ticks(now).saturating_sub(ticks(Time::ZERO + self.params.keep));
         let (s, c) = (sin(pose.heading), cos(pose.heading));
         (y - span..=y + span)
-            .flat_map(move |iy| self.cells.occupied_in(iy, x - span, 2 * span + 1).map(move |ix| (ix, iy)))
-            .filter(move |&(ix, iy)| {
-                self.cells.heard(ix, iy) >= oldest
-                    && self.cells.evidence(ix, iy).is_some_and(|evidence| evidence >= least)
-            })
-            .map(move |(ix, iy)| {
-                let off = middle(ix, iy) - pose.position();
-                Point::new(c * off.x + s * off.y, c * off.y - s * off.x)
+            .flat_map(move |iy| {
+                let off_y = middle_of(iy) - pose.y;
+                let (ahead, left) = (s * off_y, c * off_y);
+                let occupied = self.cells.occupied_in(iy, x - span, 2 * span + 1).filter(move |&ix| {
+                    self.cells.heard(ix, iy) >= oldest
+                        && self.cells.evidence(ix, iy).is_some_and(|evidence| evidence >= least)
+                });
+                occupied.map(move |ix| {
+                    let off_x = middle_of(ix) - pose.x;
+                    Point::new(c * off_x + ahead, left - s * off_x)
+                })
             })
             .filter(move |point| point.is_within(reach))
     }
@@ -174,39 +179,35 @@ impl LocalMap {
             return;
         }
         let widest = INSIDE * self.params.cone;
-        let (mut shadow, mut shaded) = ([false; SHADES], false);
-        let shade = |across: f64| ((across / widest + 1.0) * 0.5 * (SHADES - 1) as f64) as usize;
-        let stride = Walk::parts(sensor.left() * CELL);
-        let mut away = CELL / 2.0;
+        let (origin, length) = (sensor.origin * (1.0 / CELL), free / CELL);
+        // Where it is known to be free nothing changes, in a shadow or not.
+        let doubtful = Cone { origin, axis: sensor.axis, length, slope: widest }.doubtful(&self.cells);
+        let mut shadow = Shadow::new(widest);
+        let (mut ring, mut away) = (0, CELL / 2.0);
         while away < free {
             let steps = whole(widest * away / CELL);
-            let loss = if away < NEARBY { 2 } else { 1 };
-            let mut walk = Walk::new(sensor.point(away, 0.0), stride, steps);
-            let mut next = -steps;
-            loop {
-                // Of most cells in a cone it is known already, and there nothing changes, in a shadow or not.
-                let is_free = |ix, iy| self.cells.evidence(ix, iy) == Some(EVIDENCE.0);
-                next += walk.skip(steps + 1 - next, is_free);
-                if next > steps {
-                    break;
-                }
-                let off = f64::from(next) * CELL;
-                let (ix, iy) = walk.next().unwrap_or_else(|| index(sensor.point(away, off)));
-                next += 1;
-                if shaded && shadow[shade(off / away).min(SHADES - 1)] {
-                    continue;
-                }
-                let at = self.cells.slot_for(ix, iy);
-                if self.cells.get(at) >= SURE && self.is_met_obliquely(ix, iy, sensor) {
-                    let (from, to) = (shade((off - CELL / 2.0) / away), shade((off + CELL / 2.0) / away));
-                    shadow[from.min(SHADES - 1)..=to.min(SHADES - 1)].fill(true);
-                    shaded = true;
-                    continue;
-                }
-                self.cells.set(at, (self.cells.get(at) - loss).max(EVIDENCE.0));
+            let mut clear = |step| self.clear_place(sensor, away, f64::from(step) * CELL, &mut shadow);
+            match &doubtful {
+                Some(places) => places.on(ring).filter(|step| step.abs() <= steps).for_each(&mut clear),
+                None => (-steps..=steps).for_each(&mut clear),
             }
-            away += CELL;
+            (ring, away) = (ring + 1, away + CELL);
         }
+    }
+
+    /// Less evidence for what is `away` from the sensor along its axis and `off` it to the left (m).
+    fn clear_place(&mut self, sensor: Sensor, away: f64, off: f64, shadow: &mut Shadow) {
+        let (ix, iy) = index(sensor.point(away, off));
+        if self.cells.is_free(ix, iy) || shadow.covers(off / away) {
+            return;
+        }
+        let at = self.cells.slot_for(ix, iy);
+        if self.cells.get(at) >= SURE && self.is_met_obliquely(ix, iy, sensor) {
+            shadow.cast((off - CELL / 2.0) / away, (off + CELL / 2.0) / away);
+            return;
+        }
+        let loss = if away < NEARBY { 2 } else { 1 };
+        self.cells.set(at, (self.cells.get(at) - loss).max(EVIDENCE.0));
     }
 
     /// Whether a cell lies on a face that a sensor meets so obliquely that it is silent: then an echo from behind it says nothing against it.
@@ -301,9 +302,9 @@ impl LocalMap {
         let ((x, y), span) = (index(pose.position()), whole(inner / CELL));
         for iy in y - span..=y + span {
             for ix in x - span..=x + span {
-                let middle = middle(ix, iy);
-                if (middle - pose.position()).is_within(inner) {
-                    let at = self.slot_of(middle);
+                // The body was there before, for the most part.
+                if !self.cells.is_free(ix, iy) && (middle(ix, iy) - pose.position()).is_within(inner) {
+                    let at = self.cells.slot_for(ix, iy);
                     self.cells.set(at, EVIDENCE.0);
                 }
             }
@@ -315,6 +316,38 @@ impl LocalMap {
     fn slot_of(&mut self, point: Point) -> usize {
         let (ix, iy) = index(point);
         self.cells.slot_for(ix, iy)
+    }
+}
+
+/// The parts of a cone in which a silent face hides what is behind it.
+struct Shadow {
+    /// How far the cone is open to each side, for each metre along its axis.
+    widest: f64,
+    parts: [bool; SHADES],
+    /// Whether there is any: mostly there is none.
+    any: bool,
+}
+
+impl Shadow {
+    fn new(widest: f64) -> Shadow {
+        Shadow { widest, parts: [false; SHADES], any: false }
+    }
+
+    /// The part in a direction that is given like `widest`.
+    fn part(&self, across: f64) -> usize {
+        let part = ((across / self.widest + 1.0) * 0.5 * (SHADES - 1) as f64) as usize;
+        part.min(SHADES - 1)
+    }
+
+    #[inline]
+    fn covers(&self, across: f64) -> bool {
+        self.any && self.parts[self.part(across)]
+    }
+
+    fn cast(&mut self, from: f64, to: f64) {
+        let (from, to) = (self.part(from), self.part(to));
+        self.parts[from..=to].fill(true);
+        self.any = true;
     }
 }
 
@@ -397,73 +430,6 @@ impl Sensor {
     }
 }
 
-/// The cells of points in equal steps on a line, in whole numbers of 2⁻³² of a cell: a tenth of the cost of a conversion for each.
-///
-/// Next to the border of a cell the last digits of the point decide. There it says nothing, and the cell is that of the point itself,
-/// so what is found does not depend on the short way being taken.
-struct Walk {
-    at: (i64, i64),
-    step: (i64, i64),
-    /// Whether it can tell anything.
-    sure: bool,
-}
-
-impl Walk {
-    /// So near to a border it says nothing, in 2⁻³² of a cell. The numbers of the walk err by less than one for each step, those of the points by less than one.
-    const DOUBT: u32 = 1 << 12;
-    /// More steps might add up to more than that.
-    const STEPS_MOST: i32 = 1 << 10;
-    /// Farther out (m) a point has not the digits.
-    const FARTHEST: f64 = 1e4;
-
-    /// A vector in whole numbers (2⁻³² of a cell).
-    fn parts(vector: Point) -> (i64, i64) {
-        let part = |x: f64| (x * (4_294_967_296.0 / CELL)) as i64;
-        (part(vector.x), part(vector.y))
-    }
-
-    /// From `steps` before the middle on, by `step` in whole numbers.
-    fn new(middle: Point, step: (i64, i64), steps: i32) -> Walk {
-        let (x, y) = Walk::parts(middle);
-        let steps = steps.min(Walk::STEPS_MOST + 1);
-        let near = middle.x.abs() < Walk::FARTHEST && middle.y.abs() < Walk::FARTHEST;
-        let sure = near && steps <= Walk::STEPS_MOST;
-        let back = i64::from(steps);
-        let at = (x.wrapping_sub(step.0.wrapping_mul(back)), y.wrapping_sub(step.1.wrapping_mul(back)));
-        Walk { at, step, sure }
-    }
-
-    #[inline]
-    fn next(&mut self) -> Option<(i32, i32)> {
-        let (x, y) = self.at;
-        self.at = (x.wrapping_add(self.step.0), y.wrapping_add(self.step.1));
-        let sure = self.sure && Walk::is_inside(x) && Walk::is_inside(y);
-        sure.then_some(((x >> 32) as i32, (y >> 32) as i32))
-    }
-
-    /// Goes on as long as it is sure of the cells and `pass` is true of them, for at most so many steps. Says how many they were.
-    #[inline]
-    fn skip(&mut self, most: i32, pass: impl Fn(i32, i32) -> bool) -> i32 {
-        let ((mut x, mut y), (across, along)) = (self.at, self.step);
-        let mut done = 0;
-        let goes_on = |x: i64, y: i64| {
-            Walk::is_inside(x) && Walk::is_inside(y) && pass((x >> 32) as i32, (y >> 32) as i32)
-        };
-        while self.sure && done < most && goes_on(x, y) {
-            (x, y) = (x.wrapping_add(across), y.wrapping_add(along));
-            done += 1;
-        }
-        self.at = (x, y);
-        done
-    }
-
-    /// Whether a coordinate is far enough from the borders of its cell.
-    #[inline]
-    fn is_inside(part: i64) -> bool {
-        (part as u32).wrapping_add(Walk::DOUBT) > 2 * Walk::DOUBT
-    }
-}
-
 /// Time in tenths of a second.
 fn ticks(time: Time) -> i32 {
     (time.seconds() * 10.0) as i32
@@ -475,7 +441,13 @@ fn index(point: Point) -> (i32, i32) {
 }
 
 fn middle(ix: i32, iy: i32) -> Point {
-    Point::new((f64::from(ix) + 0.5) * CELL, (f64::from(iy) + 0.5) * CELL)
+    Point::new(middle_of(ix), middle_of(iy))
+}
+
+/// The middle of a column or a row.
+#[inline]
+fn middle_of(i: i32) -> f64 {
+    (f64::from(i) + 0.5) * CELL
 }
 
 #[cfg(test)]
@@ -677,23 +649,40 @@ mod tests {
         }
     }
 
+    /// What [`LocalMap::clear_cone`] is to do, place by place.
+    fn clear_by_hand(map: &mut LocalMap, sensor: Sensor, range: f64) {
+        if range <= map.params.shortest + map.params.behind {
+            return;
+        }
+        let (free, widest) = ((range - map.params.behind).min(map.params.reach), INSIDE * map.params.cone);
+        let (mut shadow, mut away) = (Shadow::new(widest), CELL / 2.0);
+        while away < free {
+            let steps = (widest * away / CELL).floor() as i32;
+            (-steps..=steps)
+                .for_each(|step| map.clear_place(sensor, away, f64::from(step) * CELL, &mut shadow));
+            away += CELL;
+        }
+    }
+
     proptest! {
         #[test]
-        fn a_walk_in_whole_numbers_finds_the_cells_of_the_points(
-            x in -9e4f64..9e4, y in -40f64..40.0, heading in -4f64..4.0, away in 0f64..3.0, steps in 0i32..60, far: bool, lined: bool
+        fn clearing_what_is_not_free_alone_does_what_clearing_all_does(
+            turn in -0.5f64..0.5, speed in -0.3f64..0.3, cone in 0.1f64..0.6, reach in 1f64..4.0,
+            readings in collection::vec(collection::vec(0.2f64..3.0, 12), 1..20)
         ) {
-            // With everything on the lattice each point lies on a border, where rounding decides.
-            let (x, y) = if lined { (CELL * (x as i32 / 1000) as f64, CELL * (y as i32) as f64) } else { (if far { x } else { x / 1e4 }, y) };
-            let pose = Pose::new(x, y, if lined { 0.0 } else { heading });
-            let sensor = Sensor::new(&MapParams { rim: 0.2, ..MapParams::default() }, pose, 0.0);
-            let stride = Walk::parts(sensor.left() * CELL);
-            let mut walk = Walk::new(sensor.point(away, 0.0), stride, steps);
-            let skipped = Walk::new(sensor.point(away, 0.0), stride, steps).skip(2 * steps + 1, |_, _| true);
-            for step in -steps..=steps {
-                let exact = index(sensor.point(away, f64::from(step) * CELL));
-                let found = walk.next();
-                prop_assert!(found.is_some() || skipped <= step + steps);
-                prop_assert!(found.is_none_or(|cell| cell == exact), "{:?} {:?}", found, exact);
+            let mut map = LocalMap::new(MapParams { cone, reach, ..MapParams::default() });
+            let mut pose = Pose::new(-2.0, 3.0, 1.0);
+            for (i, reading) in readings.iter().enumerate() {
+                pose = pose.along_arc(speed, turn);
+                let echoes = reading.iter().enumerate().map(|(k, range)| (k as f64 * PI / 6.0, *range));
+                map.update(echoes.clone(), pose, at(i as f64));
+                let mut by_hand = map.clone();
+                for (bearing, range) in echoes {
+                    let sensor = Sensor::new(&map.params, pose, bearing);
+                    map.clear_cone(sensor, range);
+                    clear_by_hand(&mut by_hand, sensor, range);
+                }
+                prop_assert!(map.cells == by_hand.cells);
             }
         }
     }

@@ -1,5 +1,7 @@
 //! The memory of a local map: cells on a torus, and a bit for each, so that many are looked at together.
 
+use types::Point;
+
 /// Cells on a side of the map.
 pub(super) const SIDE: i32 = 128;
 const CELLS: usize = (SIDE * SIDE) as usize;
@@ -20,7 +22,7 @@ type Plane = Box<[Row; SIDE as usize]>;
 type Tile = u16;
 
 /// What is known of each cell. Few cells are of interest at a time, and looking for them in words spares looking at all the others.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, PartialEq)]
 pub(super) struct Cells {
     evidence: Box<[i8; CELLS]>,
     tiles: Box<[Tile; CELLS]>,
@@ -32,6 +34,8 @@ pub(super) struct Cells {
     occupied: Plane,
     /// Where it is enough to explain an echo.
     sure: Plane,
+    /// Where it is the least there is.
+    free: Plane,
     /// Where the cell speaks of its place in the window: of those within half a map's width of the robot.
     here: Plane,
     /// The lowest cell of the window.
@@ -51,6 +55,7 @@ impl Cells {
             known: plane(),
             occupied: plane(),
             sure: plane(),
+            free: plane(),
             here: plane(),
             low: (0, 0),
         };
@@ -62,7 +67,7 @@ impl Cells {
     pub(super) fn clear(&mut self) {
         self.evidence.fill(0);
         self.tiles.fill(0);
-        for plane in [&mut self.known, &mut self.occupied, &mut self.sure] {
+        for plane in [&mut self.known, &mut self.occupied, &mut self.sure, &mut self.free] {
             plane.fill(0);
         }
         self.look_all();
@@ -79,29 +84,28 @@ impl Cells {
         let entering = |now: i32, before: i32| {
             if now > before { now.max(before + SIDE)..now + SIDE } else { now..before.min(now + SIDE) }
         };
-        for ix in entering(low.0, before.0) {
-            (low.1..low.1 + SIDE).for_each(|iy| self.look(ix, iy));
-        }
-        for iy in entering(low.1, before.1) {
-            (low.0..low.0 + SIDE).for_each(|ix| self.look(ix, iy));
-        }
+        entering(low.0, before.0).for_each(|ix| self.look_along_column(ix));
+        entering(low.1, before.1).for_each(|iy| self.look_along_row(iy));
     }
 
     fn look_all(&mut self) {
-        let (x, y) = self.low;
-        (y..y + SIDE).for_each(|iy| (x..x + SIDE).for_each(|ix| self.look(ix, iy)));
+        (self.low.1..self.low.1 + SIDE).for_each(|iy| self.look_along_row(iy));
     }
 
-    /// Sees whether the memory of a cell of the window speaks of it.
-    fn look(&mut self, ix: i32, iy: i32) {
-        let at = slot(ix, iy);
-        self.mark(at, self.tiles[at] == tile(ix, iy));
+    /// Sees which cells of a column of the window are spoken of by their memory.
+    fn look_along_column(&mut self, ix: i32) {
+        let bit = 1 << folded(ix);
+        for iy in self.low.1..self.low.1 + SIDE {
+            let is_here = self.tiles[slot(ix, iy)] == tile(ix, iy);
+            mark(&mut self.here[folded(iy)], bit, is_here);
+        }
     }
 
-    /// Notes whether the memory of a cell speaks of its place in the window.
-    fn mark(&mut self, at: usize, is_here: bool) {
-        let (row, bit) = place(at);
-        self.here[row] = if is_here { self.here[row] | bit } else { self.here[row] & !bit };
+    /// Sees which cells of a row of the window are spoken of by their memory.
+    fn look_along_row(&mut self, iy: i32) {
+        let columns = self.low.0..self.low.0 + SIDE;
+        let here = columns.filter(|&ix| self.tiles[slot(ix, iy)] == tile(ix, iy));
+        self.here[folded(iy)] = here.fold(0, |row, ix| row | 1 << folded(ix));
     }
 
     /// The place in the memory of a cell, emptied first if it still speaks of another one.
@@ -113,7 +117,8 @@ impl Cells {
             self.tiles[at] = tile(ix, iy);
             self.heard[at] = 0;
             let within = |i: i32, low: i32| (low..low + SIDE).contains(&i);
-            self.mark(at, within(ix, self.low.0) && within(iy, self.low.1));
+            let (row, bit) = place(at);
+            mark(&mut self.here[row], bit, within(ix, self.low.0) && within(iy, self.low.1));
         }
         at
     }
@@ -155,30 +160,54 @@ impl Cells {
         turn(&mut self.known, |evidence| evidence != 0);
         turn(&mut self.occupied, |evidence| evidence > 0);
         turn(&mut self.sure, |evidence| evidence >= SURE);
+        turn(&mut self.free, |evidence| evidence == EVIDENCE.0);
+    }
+
+    /// Whether a cell is known to be as free as can be.
+    #[inline]
+    pub(super) fn is_free(&self, ix: i32, iy: i32) -> bool {
+        self.evidence(ix, iy) == Some(EVIDENCE.0)
     }
 
     /// The columns in row `iy`, of `count` (less than the side) from column `first` on, whose memory has evidence above zero.
     pub(super) fn occupied_in(&self, iy: i32, first: i32, count: i32) -> Columns {
-        Columns { left: halves(turned(&self.occupied, iy, first) & lowest(count)), first }
+        Columns { left: halves(turned(self.occupied[folded(iy)], first) & lowest(count)), first }
     }
 
     /// The same for evidence that explains an echo.
     pub(super) fn sure_in(&self, iy: i32, first: i32, count: i32) -> Columns {
-        Columns { left: halves(turned(&self.sure, iy, first) & lowest(count)), first }
+        Columns { left: halves(turned(self.sure[folded(iy)], first) & lowest(count)), first }
+    }
+
+    /// The 64 columns of row `iy` from column `first` on: a bit for each that is not known to be as free as can be. All of them are in
+    /// the window.
+    #[inline]
+    pub(super) fn doubtful_from(&self, iy: i32, first: i32) -> u64 {
+        let row = folded(iy);
+        !turned(self.free[row] & self.here[row], first) as u64
+    }
+
+    /// Whether the window takes in a rectangle (both corners are in it); the corners are points in cells.
+    pub(super) fn takes_in(&self, low: Point, high: Point) -> bool {
+        let within = |from: f64, to: f64, low: i32| from >= f64::from(low) && to < f64::from(low + SIDE);
+        within(low.x, high.x, self.low.0) && within(low.y, high.y, self.low.1)
     }
 
     /// What is known of `count` squares of two cells by two (no more than 64) from the one with the lowest cell (`first`, `iy`) on; both are
     /// even. What is outside the window is not known.
     pub(super) fn squares_in(&self, first: i32, iy: i32, count: i32) -> Squares {
-        let row = |plane: &Plane| {
-            let row =
-                |iy| turned(plane, iy, first) & turned(&self.here, iy, first) & self.window_in(iy, first);
-            let both = row(iy) | row(iy + 1);
-            even_bits(both | both >> 1)
+        // What the memory says of the two rows, where it speaks of the window at all.
+        let rows = [iy, iy + 1].map(|iy| {
+            let window = self.window_in(iy, first);
+            (folded(iy), turned(self.here[folded(iy)], first) & window)
+        });
+        let squares = |plane: &Plane| {
+            let [low, high] = rows.map(|(row, here)| turned(plane[row], first) & here);
+            even_bits(low | high | (low | high) >> 1)
         };
-        let known = row(&self.known) & lowest(count) as u64;
-        let taken = known & row(&self.sure);
-        Squares { known, taken, free: known & !row(&self.occupied) }
+        let known = squares(&self.known) & lowest(count) as u64;
+        let taken = known & squares(&self.sure);
+        Squares { known, taken, free: known & !squares(&self.occupied) }
     }
 
     /// The columns of row `iy` that are in the window, from column `first` on.
@@ -191,10 +220,16 @@ impl Cells {
     }
 }
 
-/// The word of a row, turned so that the bit of column `first` is the lowest.
+/// Sets a bit of a row, or takes it out.
 #[inline]
-fn turned(plane: &Plane, iy: i32, first: i32) -> Row {
-    plane[folded(iy)].rotate_right(folded(first) as u32)
+fn mark(row: &mut Row, bit: Row, is_set: bool) {
+    *row = if is_set { *row | bit } else { *row & !bit };
+}
+
+/// A row, turned so that the bit of column `first` is the lowest.
+#[inline]
+fn turned(row: Row, first: i32) -> Row {
+    row.rotate_right(folded(first) as u32)
 }
 
 /// So many of the lowest bits.
@@ -267,12 +302,16 @@ impl Iterator for Columns {
 #[inline]
 fn even_bits(row: Row) -> u64 {
     /// Of `2 size` bits the lower half.
-    const fn lower(size: u32) -> Row {
-        Row::MAX / ((1 << size) + 1)
+    const fn lower(size: u32) -> u64 {
+        u64::MAX / ((1 << size) + 1)
     }
     // Pairs of bits are drawn together, then pairs of pairs, and so on.
-    [1, 2, 4, 8, 16, 32].into_iter().fold(row & lower(1), |row, size| (row | row >> size) & lower(2 * size))
-        as u64
+    let packed = |half: u64| {
+        let drawn = |bits: u64, size: u32| (bits | bits >> size) & lower(2 * size);
+        drawn(drawn(drawn(drawn(drawn(half & lower(1), 1), 2), 4), 8), 16)
+    };
+    let [low, high] = halves(row).map(packed);
+    low | high << 32
 }
 
 /// A row of squares of two cells by two, a bit for each.
