@@ -170,6 +170,7 @@ impl Cells {
     }
 
     /// The columns in row `iy`, of `count` (less than the side) from column `first` on, whose memory has evidence above zero.
+    #[inline]
     pub(super) fn occupied_in(&self, iy: i32, first: i32, count: i32) -> Columns {
         Columns { left: halves(turned(self.occupied[folded(iy)], first) & lowest(count)), first }
     }
