@@ -10,42 +10,20 @@
 //! What is in the way is a set of points in the frame of the robot, of a map or of a scan; the wall is on the left. For a wall on the
 //! right mirror the points and the answer.
 
-use core::ops::Range;
-use libm::{cos, fabs, fmax, fmin, sin, sqrt};
+use libm::{cos, fabs, fmin, sin, sqrt};
 use types::Point;
-use types::geometry::{PI, TAU, wrap};
+use types::geometry::{TAU, wrap};
 
 /// Directions of a fan: 5° apart, so two ways are told apart that differ by 4 cm at half a metre.
 pub const DIRECTIONS: usize = 72;
 
 /// The unit vectors of all directions, counter-clockwise from straight ahead; made once.
 #[derive(Clone, Copy, Debug)]
-pub struct Compass {
-    /// Their coordinates in rows of their own, so that several directions are compared at a time.
-    x: [f64; DIRECTIONS],
-    y: [f64; DIRECTIONS],
-}
+pub struct Compass([Point; DIRECTIONS]);
 
 impl Default for Compass {
     fn default() -> Compass {
-        Compass { x: core::array::from_fn(|i| cos(bearing(i))), y: core::array::from_fn(|i| sin(bearing(i))) }
-    }
-}
-
-impl Compass {
-    #[inline]
-    fn at(&self, direction: usize) -> Point {
-        Point::new(self.x[direction], self.y[direction])
-    }
-
-    /// Whether a point lies less far ahead than `limits` in one of these directions.
-    #[inline]
-    fn is_within(&self, directions: Range<usize>, point: Point, limits: &[f64; DIRECTIONS]) -> bool {
-        let (x, y) = (&self.x[directions.clone()], &self.y[directions.clone()]);
-        let limits = &limits[directions];
-        // No way out at the first one: that would keep it from being done for several at a time.
-        let rows = x.iter().zip(y).zip(limits);
-        rows.fold(false, |any, ((x, y), limit)| any | (point.x * x + point.y * y < *limit))
+        Compass(core::array::from_fn(|i| Point::new(cos(bearing(i)), sin(bearing(i)))))
     }
 }
 
@@ -60,223 +38,105 @@ pub fn direction(bearing: f64) -> usize {
     steps.rem_euclid(DIRECTIONS as i64) as usize
 }
 
-/// The direction of a point to within 0.55 steps: half a step more is within the steps that [`span`] gives.
-///
-/// The arc tangent by a parabola, which errs by 0.004 rad at most (Rajan et al., "Efficient approximations for the arctangent
-/// function", 2006).
-fn roughly(point: Point) -> usize {
-    let (x, y) = (fabs(point.x), fabs(point.y));
-    let arc = |ratio: f64| ratio * (PI / 4.0 + 0.273 * (1.0 - ratio));
-    let acute = if y <= x { arc(y / x) } else { PI / 2.0 - arc(x / y) };
-    let ahead = if point.x < 0.0 { PI - acute } else { acute };
-    let around = if point.y < 0.0 { TAU - ahead } else { ahead };
-    (around * (DIRECTIONS as f64 / TAU) + 0.5) as usize % DIRECTIONS
-}
-
-/// So many steps to either side, at least, a point can be in the way whose room is `ratio` of its distance.
-///
-/// Those within asin(ratio) of its bearing; asin(x) ≤ x + (π/2 − 1) x³, as all terms of its series are positive.
-fn span(ratio: f64) -> usize {
-    let half = ratio + (PI / 2.0 - 1.0) * ratio * ratio * ratio;
-    // The direction next to the bearing is up to 0.55 steps off, and 0.45 steps lie between a whole number and the next of these.
-    (half * (DIRECTIONS as f64 / TAU) + 1.0) as usize
-}
-
 /// How far a body may go straight on in each direction (m), and what stops it there.
+///
+/// A direction is looked at when it is asked for: a way is chosen after a few of them, and for the question whether one is free the
+/// first point that is in the way is answer enough.
 #[derive(Clone, Copy, Debug)]
-pub struct Fan {
-    ways: [f64; DIRECTIONS],
-    stops: [Point; DIRECTIONS],
+pub struct Fan<'a, P> {
+    compass: &'a Compass,
+    points: P,
+    room: f64,
 }
 
 /// What is nearer than wanted already may stay as near, less this (m).
 const NO_NEARER: f64 = 0.01;
 
-impl Fan {
-    /// The free ways for a body that wants `room` (m) from its middle to everything.
+impl<'a, P: Iterator<Item = Point> + Clone> Fan<'a, P> {
+    /// The free ways among `points` for a body that wants `room` (m) from its middle to everything.
     ///
     /// A point at distance ρ, off the direction by δ, stops the body after ρ cos δ − √(room² − ρ² sin² δ). With a point nearer than
     /// `room` already it may go where it comes no nearer: then its distance counts in place of the room.
-    pub fn new(compass: &Compass, points: impl Iterator<Item = Point>, room: f64) -> Fan {
-        let [fan] = Fan::of_rooms(compass, points, [room]);
-        fan
-    }
-
-    /// The fans for several rooms (m), at little more than the price of the largest.
-    pub fn of_rooms<const N: usize>(
-        compass: &Compass,
-        points: impl Iterator<Item = Point>,
-        rooms: [f64; N],
-    ) -> [Fan; N] {
-        let mut drawing = Drawing::new(compass, rooms);
-        let mut batch = Batch::default();
-        for (number, point) in points.enumerate() {
-            batch.put(number, point);
-            if batch.len == BATCH {
-                batch.draw(&mut drawing);
-            }
-        }
-        batch.draw(&mut drawing);
-        drawing.fans
+    pub fn new(compass: &'a Compass, points: P, room: f64) -> Fan<'a, P> {
+        Fan { compass, points, room }
     }
 
     /// The free way in a direction (m); infinite if nothing is there.
     pub fn way(&self, direction: usize) -> f64 {
-        self.ways[direction % DIRECTIONS]
+        self.nearest(direction).0
     }
 
-    /// What stops the body in a direction.
-    pub fn stop(&self, direction: usize) -> Point {
-        self.stops[direction % DIRECTIONS]
+    /// What stops the body in a direction; of two points that stop it at the same place the first.
+    pub fn stop(&self, direction: usize) -> Option<Point> {
+        self.nearest(direction).1
     }
 
-    /// The first direction, from `start` clockwise, in which the way is free for `look` (m), and the point that stopped the direction before.
+    /// Whether the way in a direction is free for `look` (m).
+    pub fn is_free(&self, direction: usize, look: f64) -> bool {
+        self.first_free([direction], look).is_some()
+    }
+
+    /// The first direction, from `start` clockwise, in which the way is free for `look` (m).
     pub fn sweep(&self, start: usize, look: f64) -> Option<Found> {
-        let mut touched = None;
-        for step in 0..DIRECTIONS {
-            let i = (start + DIRECTIONS - step) % DIRECTIONS;
-            if self.ways[i] >= look {
-                return Some(Found { turned: step, direction: i, touched });
-            }
-            touched = Some(self.stops[i]);
-        }
-        None
+        let clockwise = (0..DIRECTIONS).map(|step| (start + DIRECTIONS - step) % DIRECTIONS);
+        let direction = self.first_free(clockwise, look)?;
+        Some(Found { turned: (start + DIRECTIONS - direction) % DIRECTIONS, direction })
+    }
+
+    /// What the hand touches: the point that stopped the last try of a sweep. None if the first one was free.
+    pub fn touched(&self, found: Found) -> Option<Point> {
+        if found.turned == 0 { None } else { self.stop(found.direction + 1) }
     }
 
     /// The free direction that is nearest to `wanted`, off by no more than `most` (rad).
     pub fn nearest_free(&self, wanted: usize, look: f64, most: f64) -> Option<usize> {
         let steps = (most / TAU * DIRECTIONS as f64) as usize;
-        (0..=steps)
-            .flat_map(|step| [wanted + DIRECTIONS - step, wanted + step])
-            .map(|i| i % DIRECTIONS)
-            .find(|&i| self.ways[i] >= look)
-    }
-}
-
-/// Points that are looked at together; a map of a room gives fewer.
-const BATCH: usize = 512;
-
-/// Points in the order of their distance: what is near hides most of the rest, which then costs next to nothing.
-struct Batch {
-    points: [Point; BATCH],
-    /// The square of the distance as bits, which are in order where numbers are; in the low digits the place of the point.
-    keys: [u64; BATCH],
-    len: usize,
-    /// The number of the first point.
-    first: usize,
-}
-
-impl Default for Batch {
-    fn default() -> Batch {
-        Batch { points: [Point::new(0.0, 0.0); BATCH], keys: [0; BATCH], len: 0, first: 0 }
-    }
-}
-
-impl Batch {
-    fn put(&mut self, number: usize, point: Point) {
-        if self.len == 0 {
-            self.first = number;
-        }
-        self.points[self.len] = point;
-        self.keys[self.len] = point.dot(point).to_bits() & !(BATCH as u64 - 1) | self.len as u64;
-        self.len += 1;
+        let outwards = (0..=steps).flat_map(|step| [wanted + DIRECTIONS - step, wanted + step]);
+        self.first_free(outwards.map(|i| i % DIRECTIONS), look)
     }
 
-    /// Draws the points and forgets them.
-    fn draw<const N: usize>(&mut self, drawing: &mut Drawing<'_, N>) {
-        let keys = &mut self.keys[..self.len];
-        keys.sort_unstable();
-        for key in keys {
-            let place = *key as usize % BATCH;
-            drawing.add(self.first + place, self.points[place]);
-        }
-        self.len = 0;
-    }
-}
-
-/// Fans in the making.
-struct Drawing<'a, const N: usize> {
-    compass: &'a Compass,
-    rooms: [f64; N],
-    /// The largest of them.
-    most: f64,
-    fans: [Fan; N],
-    /// The numbers of the points that stop the body: of two that stop it at the same place the first counts, whatever the order in
-    /// which they are looked at.
-    numbers: [[usize; DIRECTIONS]; N],
-    /// What lies as far ahead as this shortens no way of any fan.
-    limits: [f64; DIRECTIONS],
-}
-
-/// More than the error of a sum of two lengths (m).
-const HAIR: f64 = 1e-9;
-
-impl<'a, const N: usize> Drawing<'a, N> {
-    fn new(compass: &'a Compass, rooms: [f64; N]) -> Drawing<'a, N> {
-        const FREE: Fan =
-            Fan { ways: [f64::INFINITY; DIRECTIONS], stops: [Point::new(0.0, 0.0); DIRECTIONS] };
-        Drawing {
-            compass,
-            rooms,
-            most: rooms.iter().copied().fold(0.0, fmax),
-            fans: [FREE; N],
-            numbers: [[0; DIRECTIONS]; N],
-            limits: [f64::INFINITY; DIRECTIONS],
-        }
+    /// The first of these directions in which the way is free for `look` (m).
+    fn first_free(&self, directions: impl IntoIterator<Item = usize>, look: f64) -> Option<usize> {
+        let mut known = None;
+        directions.into_iter().find(|direction| {
+            let towards = self.towards(*direction);
+            let is_in_the_way = |point: &Point| self.way_to(*point, towards) < look;
+            // What was in the way in one direction mostly is in the next one too.
+            known = known.filter(is_in_the_way).or_else(|| self.points.clone().find(is_in_the_way));
+            known.is_none()
+        })
     }
 
-    /// Takes in a point.
-    fn add(&mut self, number: usize, point: Point) {
-        let away = sqrt(point.dot(point));
-        // The last digit counts only for what is nearer than wanted, and it is dear.
-        let distance = if away > self.most + 2.0 * NO_NEARER { away } else { point.norm() };
-        let rooms = self.rooms.map(|room| fmin(room, distance - NO_NEARER));
-        let widest = rooms.iter().copied().fold(0.0, fmax);
-        if widest <= 0.0 {
-            return;
-        }
-        let span = span(widest / distance);
-        let first = (roughly(point) + DIRECTIONS - span) % DIRECTIONS;
-        let last = first + 2 * span + 1;
-        // The directions lie in a circle.
-        for directions in [first..last.min(DIRECTIONS), 0..last.saturating_sub(DIRECTIONS)] {
-            if self.compass.is_within(directions.clone(), point, &self.limits) {
-                directions.for_each(|i| self.offer(i, number, point, &rooms));
-            }
-        }
+    /// The free way in a direction (m), and what ends it.
+    fn nearest(&self, direction: usize) -> (f64, Option<Point>) {
+        let towards = self.towards(direction);
+        self.points.clone().fold((f64::INFINITY, None), |(way, stop), point| {
+            let to = self.way_to(point, towards);
+            if to < way { (to, Some(point)) } else { (way, stop) }
+        })
     }
 
-    /// A point that may stop the body in direction `i`.
-    fn offer(&mut self, i: usize, number: usize, point: Point, rooms: &[f64; N]) {
-        let along = point.dot(self.compass.at(i));
-        if along <= 0.0 || along >= self.limits[i] {
-            return;
-        }
-        let across = point.cross(self.compass.at(i));
-        // Most is too late for all fans: one branch for them together.
-        let may_stop: [bool; N] = core::array::from_fn(|k| {
-            let under = rooms[k] * rooms[k] - across * across;
-            let behind = along - self.fans[k].ways[i];
-            // along − √under > way where (along − way)² > under. What is as near to equal as rounding may be is looked at.
-            let too_late = (behind > 0.0) & (behind * behind > under + HAIR * (1.0 + along * along));
-            (rooms[k] > 0.0) & (under > 0.0) & !too_late
-        });
-        if !may_stop.iter().fold(false, |any, may| any | may) {
-            return;
-        }
-        for k in (0..N).filter(|k| may_stop[*k]) {
-            let fan = &mut self.fans[k];
-            let way = along - sqrt(rooms[k] * rooms[k] - across * across);
-            if way < fan.ways[i] || (way == fan.ways[i] && number < self.numbers[k][i]) {
-                (fan.ways[i], fan.stops[i], self.numbers[k][i]) = (way, point, number);
-            }
-        }
-        self.limit(i);
+    fn towards(&self, direction: usize) -> Point {
+        self.compass.0[direction % DIRECTIONS]
     }
 
-    fn limit(&mut self, i: usize) {
-        let farthest = self.fans.iter().zip(self.rooms).map(|(fan, room)| fan.ways[i] + fmax(room, 0.0));
-        self.limits[i] = farthest.fold(0.0, fmax) + HAIR;
+    /// How far it may go `towards` (a unit vector) for all that one point is in the way (m).
+    fn way_to(&self, point: Point, towards: Point) -> f64 {
+        let (along, across) = (point.dot(towards), point.cross(towards));
+        // Most points are behind or beside the way, and their distance is dear.
+        if !(along > 0.0 && across * across < self.room * self.room) {
+            return f64::INFINITY;
+        }
+        let room = self.room_to(point);
+        let under = room * room - across * across;
+        if room > 0.0 && under > 0.0 { along - sqrt(under) } else { f64::INFINITY }
+    }
+
+    /// How much room is kept to a point (m): as much as is wanted, or as there is.
+    fn room_to(&self, point: Point) -> f64 {
+        // The last digit counts only for what is nearer than wanted.
+        let enough = self.room + 2.0 * NO_NEARER;
+        if point.dot(point) > enough * enough { self.room } else { fmin(self.room, point.norm() - NO_NEARER) }
     }
 }
 
@@ -287,8 +147,6 @@ pub struct Found {
     pub turned: usize,
     /// The free one.
     pub direction: usize,
-    /// What the hand touches: the point that stopped the last try. None if the first one was free.
-    pub touched: Option<Point>,
 }
 
 /// How far two directions are apart (rad).
@@ -308,23 +166,30 @@ mod tests {
         (0..=((to - from) / 0.05) as usize).map(|i| Point::new(from + 0.05 * i as f64, y)).collect()
     }
 
-    fn fan(points: &[Point], room: f64) -> Fan {
-        Fan::new(&Compass::default(), points.iter().copied(), room)
+    fn fan<'a>(
+        compass: &'a Compass,
+        points: &'a [Point],
+        room: f64,
+    ) -> Fan<'a, impl Iterator<Item = Point> + Clone> {
+        Fan::new(compass, points.iter().copied(), room)
     }
 
     #[test]
     fn a_single_point_stops_a_disc_where_it_touches() {
-        let fan = fan(&[Point::new(1.0, 0.1)], 0.3);
+        let (compass, points) = (Compass::default(), [Point::new(1.0, 0.1)]);
+        let fan = fan(&compass, &points, 0.3);
         assert!((fan.way(0) - (1.0 - (0.09f64 - 0.01).sqrt())).abs() < 1e-12);
-        assert_eq!(fan.way(direction(PI / 2.0)), f64::INFINITY);
+        assert_eq!((fan.way(direction(PI / 2.0)), fan.stop(direction(PI / 2.0))), (f64::INFINITY, None));
     }
 
     #[test]
     fn the_sweep_goes_along_a_wall_on_the_left() {
-        let points = wall(0.3, -2.0, 2.0);
-        let found = fan(&points, 0.28).sweep(direction(PI / 2.0), 0.7).unwrap();
+        let (compass, points) = (Compass::default(), wall(0.3, -2.0, 2.0));
+        let fan = fan(&compass, &points, 0.28);
+        let found = fan.sweep(direction(PI / 2.0), 0.7).unwrap();
         assert_eq!(bearing(found.direction).to_degrees().round(), 0.0);
-        assert!(found.touched.unwrap().x > 0.0);
+        assert!(fan.touched(found).unwrap().x > 0.0);
+        assert_eq!(fan.touched(fan.sweep(direction(-PI / 2.0), 0.7).unwrap()), None);
     }
 
     #[test]
@@ -332,14 +197,15 @@ mod tests {
         for (gap, enters) in [(0.66, true), (0.5, false)] {
             let mut points = wall(0.4, -2.0, -gap / 2.0);
             points.extend(wall(0.4, gap / 2.0, 2.0));
-            let found = fan(&points, 0.28).sweep(direction(2.5), 0.7).unwrap();
+            let found = fan(&Compass::default(), &points, 0.28).sweep(direction(2.5), 0.7).unwrap();
             assert_eq!(bearing(found.direction) > 1.2, enters, "{gap} m: {found:?}");
         }
     }
 
     #[test]
     fn from_too_near_it_may_go_away_and_along_but_not_nearer() {
-        let fan = fan(&wall(0.2, -2.0, 2.0), 0.4);
+        let (compass, points) = (Compass::default(), wall(0.2, -2.0, 2.0));
+        let fan = fan(&compass, &points, 0.4);
         assert!(fan.way(direction(PI / 2.0)) < 0.05 && fan.way(direction(-PI / 2.0)).is_infinite());
         assert!(fan.sweep(direction(PI / 2.0), 0.5).is_some_and(|found| bearing(found.direction) > -1.3));
     }
@@ -347,49 +213,64 @@ mod tests {
     #[test]
     fn all_around_closed_there_is_no_way() {
         let ring: Vec<Point> = (0..72).map(|i| Point::polar(0.5, f64::from(i) * PI / 36.0)).collect();
-        assert_eq!(fan(&ring, 0.28).sweep(0, 0.7), None);
+        assert_eq!(fan(&Compass::default(), &ring, 0.28).sweep(0, 0.7), None);
     }
 
-    /// The fan for one room as its law says it: each point, each direction, no shorter way.
-    fn by_hand(points: &[Point], room: f64) -> Fan {
+    /// The ways as their law says it: each point, each direction, no shorter way.
+    fn by_hand(points: &[Point], room: f64) -> [(f64, Option<Point>); DIRECTIONS] {
         let compass = Compass::default();
-        let mut fan = Fan { ways: [f64::INFINITY; DIRECTIONS], stops: [Point::default(); DIRECTIONS] };
+        let mut ways = [(f64::INFINITY, None); DIRECTIONS];
         for &point in points {
             let room = fmin(room, point.norm() - NO_NEARER);
-            for i in 0..if room > 0.0 { DIRECTIONS } else { 0 } {
-                let (along, across) = (point.dot(compass.at(i)), point.cross(compass.at(i)));
+            for (towards, way) in compass.0.into_iter().zip(&mut ways) {
+                let (along, across) = (point.dot(towards), point.cross(towards));
                 let under = room * room - across * across;
-                if along > 0.0 && under > 0.0 && along - sqrt(under) < fan.ways[i] {
-                    (fan.ways[i], fan.stops[i]) = (along - sqrt(under), point);
+                if room > 0.0 && along > 0.0 && under > 0.0 && along - sqrt(under) < way.0 {
+                    *way = (along - sqrt(under), Some(point));
                 }
             }
         }
-        fan
+        ways
     }
 
     proptest! {
         #[test]
-        fn fans_made_together_are_to_the_last_bit_those_of_the_law(
-            points in proptest::collection::vec((0.0f64..2.0, -3.2f64..3.2), 0..60),
-            rooms in [0.0f64..0.6, 0.0f64..0.6, 0.0f64..0.6]
+        fn a_fan_is_to_the_last_bit_that_of_the_law(
+            points in proptest::collection::vec((0.0f64..2.0, -3.2f64..3.2), 0..60), room in 0.0f64..0.6,
+            look in 0.0f64..1.5, start in 0..DIRECTIONS, most in 0.0f64..2.0
         ) {
             let mut points: Vec<Point> = points.iter().map(|(r, b)| Point::polar(*r, *b)).collect();
-            // Next to the edges: on the axes, and at the distance up to which a point counts in place of the room.
-            points.extend([Point::new(0.0, 0.5), Point::new(-0.7, 0.0), Point::new(0.0, 0.0), Point::new(rooms[0] + NO_NEARER, 0.0)]);
-            let fans = Fan::of_rooms(&Compass::default(), points.iter().copied(), rooms);
-            for (fan, room) in fans.iter().zip(rooms) {
-                let known = by_hand(&points, room);
-                prop_assert_eq!(fan.ways, known.ways);
-                prop_assert_eq!(fan.stops, known.stops);
+            // Next to the edges: on the axes, and at the distances up to which a point counts in place of the room.
+            points.extend([Point::new(0.0, 0.5), Point::new(-0.7, 0.0), Point::new(0.0, 0.0)]);
+            points.extend([NO_NEARER, 2.0 * NO_NEARER].map(|more| Point::new(room + more, 0.0)));
+            let compass = Compass::default();
+            let fan = fan(&compass, &points, room);
+            let known = by_hand(&points, room);
+            for (i, way) in known.iter().enumerate() {
+                prop_assert_eq!((fan.way(i), fan.stop(i)), *way);
+                prop_assert_eq!(fan.is_free(i, look), way.0 >= look);
             }
+            let is_free = |i: &usize| known[i % DIRECTIONS].0 >= look;
+            let turned = (0..DIRECTIONS).find(|step| is_free(&(start + DIRECTIONS - step)));
+            let found = fan.sweep(start, look);
+            prop_assert_eq!(found.map(|found| found.turned), turned);
+            if let Some(found) = found {
+                let before = (found.direction + 1) % DIRECTIONS;
+                prop_assert_eq!(found.direction, (start + DIRECTIONS - found.turned) % DIRECTIONS);
+                prop_assert_eq!(fan.touched(found), if found.turned == 0 { None } else { known[before].1 });
+            }
+            let nearest = (0..DIRECTIONS)
+                .filter(|i| is_free(i) && apart(start, *i) <= most)
+                .fold(PI, |nearest, i| fmin(nearest, apart(start, i)));
+            let found = fan.nearest_free(start, look, most).map_or(PI, |i| apart(start, i));
+            prop_assert!(fabs(found - nearest) < 1e-9, "{found} {nearest}");
         }
 
         /// At the end of a free way nothing is nearer than the room, or nearer than it was.
         #[test]
         fn a_free_way_is_free(points in proptest::collection::vec((0.3f64..2.0, -3.1f64..3.1), 1..40), i in 0usize..72) {
             let points: Vec<Point> = points.iter().map(|(r, b)| Point::polar(*r, *b)).collect();
-            let fan = fan(&points, 0.3);
-            let way = fmin(fan.way(i), 3.0);
+            let way = fmin(fan(&Compass::default(), &points, 0.3).way(i), 3.0);
             for k in 0..=20 {
                 let here = Point::polar(way * f64::from(k) / 20.0, bearing(i));
                 for p in &points {

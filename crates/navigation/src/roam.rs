@@ -154,6 +154,14 @@ const STRIDE: f64 = 0.2;
 /// How far off the way it may go around what is in it (rad): 60°.
 const ASIDE: f64 = 1.05;
 
+/// What is in the way; it is gone through several times.
+trait Points: Iterator<Item = Point> + Clone {}
+
+impl<P: Iterator<Item = Point> + Clone> Points for P {}
+
+/// The free ways with much room, with some and with the least.
+type Fans<'a, P> = [Fan<'a, P>; 3];
+
 /// Roams. One `step` a reading, or more often.
 #[derive(Clone, Copy, Debug)]
 pub struct Roamer {
@@ -242,7 +250,9 @@ impl Roamer {
         let sign = self.parameters.side.sign();
         let points = points.map(|p| Point::new(p.x, p.y * sign));
         self.remember(pose, ground, fmax(dt, 0.0));
-        let fans = self.fans(points.clone());
+        // A copy: the ways are looked at while the roamer changes.
+        let compass = self.compass;
+        let fans = self.fans(&compass, points.clone());
         let wanted = match self.mode {
             Mode::Search => self.search(&fans, ground),
             Mode::Following => self.follow(points, &fans, ground),
@@ -278,14 +288,14 @@ impl Roamer {
         self.spot_since += dt;
     }
 
-    /// The free ways with much room, with some and with the least.
-    fn fans(&self, points: impl Iterator<Item = Point>) -> [Fan; 3] {
+    /// Those among `points`.
+    fn fans<'a, P: Points>(&self, compass: &'a Compass, points: P) -> Fans<'a, P> {
         let Parameters { keep, least, .. } = self.parameters;
-        Fan::of_rooms(&self.compass, points, [keep, (keep + least) / 2.0, least])
+        [keep, (keep + least) / 2.0, least].map(|room| Fan::new(compass, points.clone(), room))
     }
 
     /// Straight on, or along what is in the way.
-    fn search(&mut self, fans: &[Fan; 3], ground: &mut Ground) -> Option<usize> {
+    fn search(&mut self, fans: &Fans<'_, impl Points>, ground: &mut Ground) -> Option<usize> {
         if self.stale > self.parameters.restless && self.set_out(ground) {
             return self.leave(fans, ground);
         }
@@ -298,19 +308,16 @@ impl Roamer {
                 self.go(way);
                 return self.leave(fans, ground);
             }
-            self.anchor = self.pose.transform(fans[2].stop(ahead));
+            if let Some(stop) = fans[2].stop(ahead) {
+                self.anchor = self.pose.transform(stop);
+            }
             self.mode = Mode::Following;
             return fans[2].sweep(ahead, look).map(|found| found.direction);
         }
         free
     }
 
-    fn follow(
-        &mut self,
-        points: impl Iterator<Item = Point> + Clone,
-        fans: &[Fan; 3],
-        ground: &mut Ground,
-    ) -> Option<usize> {
+    fn follow<P: Points>(&mut self, points: P, fans: &Fans<'_, P>, ground: &mut Ground) -> Option<usize> {
         let Parameters { look, restless, patience, .. } = self.parameters;
         if (self.stale > restless || self.spot_since > patience) && self.set_out(ground) {
             return self.leave(fans, ground);
@@ -322,7 +329,7 @@ impl Roamer {
         let start = direction(self.pose.inverse().transform(self.anchor).bearing());
         let found = fans[2].sweep(start, look).or_else(|| fans[2].sweep(start, LAST * look))?;
         let behind = bearing(start) > BEHIND || bearing(start) < -BEHIND;
-        if let Some(touched) = found.touched.filter(|_| behind) {
+        if behind && let Some(touched) = fans[2].touched(found) {
             self.anchor = self.pose.transform(touched);
         }
         let roomy = fans[..2].iter().find_map(|fan| {
@@ -333,9 +340,9 @@ impl Roamer {
     }
 
     /// Whether there is something to follow: what is touched, or else what is nearest on the wall's side.
-    fn find_anchor(&mut self, points: impl Iterator<Item = Point> + Clone) -> bool {
+    fn find_anchor(&mut self, points: impl Points) -> bool {
         let local = self.pose.inverse().transform(self.anchor);
-        if points.clone().any(|p| p.distance(local) <= STILL_THERE) {
+        if points.clone().any(|p| (p - local).is_within(STILL_THERE)) {
             return true;
         }
         let reach = self.parameters.look + self.parameters.keep;
@@ -423,7 +430,7 @@ impl Roamer {
     }
 
     /// Along the way to new ground, around what is in it.
-    fn leave(&mut self, fans: &[Fan; 3], ground: &mut Ground) -> Option<usize> {
+    fn leave(&mut self, fans: &Fans<'_, impl Points>, ground: &mut Ground) -> Option<usize> {
         let patience = self.parameters.patience;
         if self.gain_age > patience + SLOW * self.least_cost || self.spot_since > patience {
             // It does not get there.
@@ -443,7 +450,7 @@ impl Roamer {
             return self.search(fans, ground);
         }
         let (ahead, far) = self.carrot(&fans[2])?;
-        if fans[2].way(ahead) >= far {
+        if fans[2].is_free(ahead, far) {
             self.blocked_age = 0.0;
         }
         if self.blocked_age < LOOKS {
@@ -455,7 +462,7 @@ impl Roamer {
     }
 
     /// The direction and the distance (m) of the place on the way that it steers to: the farthest to which it may go straight, or else the nearest.
-    fn carrot(&self, fan: &Fan) -> Option<(usize, f64)> {
+    fn carrot(&self, fan: &Fan<'_, impl Points>) -> Option<(usize, f64)> {
         let way = self.way.as_ref()?;
         let here = self.real_pose();
         let away = |i: usize| way.points()[i].distance(here.position());
@@ -466,14 +473,20 @@ impl Roamer {
             (direction(local.bearing() * self.parameters.side.sign()), local.norm())
         });
         let seen = seen.skip_while(|(_, far)| *far < STRIDE).take_while(|(_, far)| *far <= CARROT);
-        let straight = seen.clone().take_while(|(way, far)| fan.way(*way) >= *far).last();
+        let straight = seen.clone().take_while(|(way, far)| fan.is_free(*way, *far)).last();
         straight.or_else(|| seen.clone().next()).or_else(|| {
             let local = here.inverse().transform(way.goal());
             Some((direction(local.bearing() * self.parameters.side.sign()), local.norm()))
         })
     }
 
-    fn drive(&mut self, wanted: Option<usize>, fans: &[Fan; 3], beside: Beside, dt: f64) -> Twist {
+    fn drive(
+        &mut self,
+        wanted: Option<usize>,
+        fans: &Fans<'_, impl Points>,
+        beside: Beside,
+        dt: f64,
+    ) -> Twist {
         let p = self.parameters;
         let Some(wanted) = wanted else {
             // No way at all: look around, what was heard may not be there any more.
