@@ -1,6 +1,6 @@
 //! A bit for each cell of a square grid on a torus, and what morphology needs of it, a word of 64 cells at a time.
 
-use libm::{floor, sqrt};
+use libm::floor;
 
 /// Cells on a side: with cells of 10 cm that is a floor of 25.6 m, with several rooms.
 pub(crate) const SIDE: usize = 256;
@@ -73,8 +73,9 @@ impl Layer {
     pub(crate) fn count(&self, cell: usize, reach: usize) -> u32 {
         let (row, column) = (cell / SIDE, cell % SIDE);
         let mask = (1u64 << (2 * reach + 1)) - 1;
+        let first = (column + SIDE - reach) % SIDE;
         (row + SIDE - reach..=row + SIDE + reach)
-            .map(|y| (turned(&self.0[y % SIDE], SIDE + reach - column)[0] & mask).count_ones())
+            .map(|y| (self.row_from(y % SIDE * SIDE + first) & mask).count_ones())
             .sum()
     }
 
@@ -110,10 +111,9 @@ impl Layer {
             // From the top of the disc to its middle it grows wider.
             let (mut wide, mut width) = (*row, 0);
             for dy in (0..=reach).rev() {
-                let half = floor(sqrt(radius * radius - (dy * dy) as f64)) as usize;
-                while width < half {
+                while ((width + 1) * (width + 1) + dy * dy) as f64 <= radius * radius {
                     width += 1;
-                    wide = either(wide, either(turned(row, width), turned(row, SIDE - width)));
+                    wide = widened(wide);
                 }
                 for y in [y + dy, y + SIDE - dy] {
                     let out = &mut self.0[y % SIDE];
@@ -128,14 +128,13 @@ fn either(a: Row, b: Row) -> Row {
     std::array::from_fn(|i| a[i] | b[i])
 }
 
-/// A row turned by so many columns, upwards.
-fn turned(row: &Row, by: usize) -> Row {
-    let (words, bits) = (by / 64, by % 64);
+/// A row and what is next to it.
+fn widened(row: Row) -> Row {
     std::array::from_fn(|i| {
-        let high = row[(i + 2 * WORDS - words) % WORDS] << bits;
-        let low = row[(i + 2 * WORDS - words - 1) % WORDS];
-        // The lowest bits of a word come from the one before it.
-        high | (low >> 1) >> (63 - bits)
+        // The lowest bit of a word comes from the one before it, the highest from the one after it.
+        let up = row[i] << 1 | row[(i + WORDS - 1) % WORDS] >> 63;
+        let down = row[i] >> 1 | row[(i + 1) % WORDS] << 63;
+        row[i] | up | down
     })
 }
 
