@@ -65,9 +65,7 @@ impl Search {
     ) -> Option<usize> {
         let mut best: Option<(u32, usize)> = None;
         let most = most * STRAIGHT;
-        self.costs.fill(NONE);
-        self.buckets.fill(NONE);
-        (self.used, self.waiting) = (0, 0);
+        self.forget();
         self.offer(start, 0, NONE);
         let mut cost = 0;
         while self.waiting > 0 {
@@ -91,7 +89,10 @@ impl Search {
                 break;
             }
             for (next, step) in neighbours(cell) {
-                if let Some(factor) = floor.factor(next, start) {
+                // Most have been reached at less cost already.
+                if cost + step < self.costs[next]
+                    && let Some(factor) = floor.factor(next, start)
+                {
                     let total = cost + step * factor;
                     if total < self.costs[next] {
                         self.offer(next, total, cell as u32);
@@ -100,6 +101,15 @@ impl Search {
             }
         }
         best.map(|(_, cell)| cell)
+    }
+
+    /// Forgets the search before, whose cells are those in its lists: mostly a small part of the floor.
+    fn forget(&mut self) {
+        for (cell, _) in &self.places[..self.used] {
+            self.costs[*cell as usize] = NONE;
+        }
+        self.buckets.fill(NONE);
+        (self.used, self.waiting) = (0, 0);
     }
 
     /// The cell before a cell on the way to it; none at the start.
