@@ -198,7 +198,7 @@ impl Ground {
                     let ix = left.trailing_zeros() as i32;
                     left &= left - 1;
                     let middle = centre(first + ix, iy);
-                    if middle.distance(here) <= near
+                    if (middle - here).is_within(near)
                         && self.is_seen(here, middle)
                         && let Some(cell) = self.cell(middle)
                     {
@@ -457,6 +457,18 @@ mod tests {
         assert!(ground.way_to_new(Point::default(), ROOM, None).is_none());
         ground.forget_given_up();
         assert_eq!(ground.way_to_new(Point::default(), ROOM, None).unwrap().goal(), goal);
+    }
+
+    #[test]
+    fn a_search_knows_nothing_of_those_before() {
+        let mut ground = room(0.9);
+        for here in [(-1.0, 1.0), (1.5, -1.5), (0.0, 0.0), (-1.0, 1.0)] {
+            let here = Point::new(here.0, here.1);
+            let mut fresh = Ground { search: Search::new(), ..ground.clone() };
+            let (way, first) = (ground.way_to_new(here, ROOM, None), fresh.way_to_new(here, ROOM, None));
+            let (way, first) = (way.unwrap(), first.unwrap());
+            assert_eq!((way.points(), way.cost()), (first.points(), first.cost()));
+        }
     }
 
     #[test]
