@@ -69,6 +69,48 @@ pub(crate) struct Near {
     pub point: Point,
 }
 
+/// Of `count` cells in a row the one at `offset` (m) from its begin, or the one nearest to there.
+#[inline]
+fn cell_at(offset: f64, count: u32) -> u32 {
+    // Cutting off is rounding down above zero, and gives zero below.
+    ((offset / CELL) as u32).min(count - 1)
+}
+
+/// How a ray crosses the cells along one axis.
+struct Crossing {
+    /// Where the ray leaves the present cell, in lengths of its direction.
+    out: f64,
+    /// From there to where it leaves the next.
+    apart: f64,
+    /// How many cells come before the border of the grid.
+    left: u32,
+    forward: bool,
+}
+
+impl Crossing {
+    /// From cell `index` of `count`, for a ray that begins at `from` and goes `along` this axis; `inverse` is 1 / `along`.
+    #[inline]
+    fn new(index: u32, count: u32, from: f64, along: f64, inverse: f64) -> Crossing {
+        let forward = along > 0.0;
+        let left = if forward { count - 1 - index } else { index };
+        if along == 0.0 {
+            return Crossing { out: f64::INFINITY, apart: f64::INFINITY, left, forward };
+        }
+        let border = f64::from(index + u32::from(forward)) * CELL;
+        Crossing { out: (border - from) * inverse, apart: CELL * fabs(inverse), left, forward }
+    }
+
+    /// Goes on to the next cell, which is `stride` away in the row of all cells, if there is one.
+    #[inline]
+    fn step(&mut self, cell: &mut usize, stride: u32) -> bool {
+        let Some(left) = self.left.checked_sub(1) else { return false };
+        self.left = left;
+        self.out += self.apart;
+        *cell = if self.forward { *cell + stride as usize } else { *cell - stride as usize };
+        true
+    }
+}
+
 /// Cells from `first` to `last` on both axes, both included.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 struct Block {
@@ -199,11 +241,11 @@ impl Field {
     }
 
     fn column(&self, x: f64) -> u32 {
-        (floor((x - self.min.x) / CELL).max(0.0) as u32).min(self.columns - 1)
+        cell_at(x - self.min.x, self.columns)
     }
 
     fn row(&self, y: f64) -> u32 {
-        (floor((y - self.min.y) / CELL).max(0.0) as u32).min(self.rows - 1)
+        cell_at(y - self.min.y, self.rows)
     }
 
     fn block(&self, min: Point, max: Point) -> Block {
@@ -272,15 +314,42 @@ impl Field {
         limit: f64,
         mut visit: impl FnMut(usize, f64) -> bool,
     ) {
-        let width = f64::from(self.columns) * CELL;
-        let height = f64::from(self.rows) * CELL;
-        let (ox, oy) = (origin.x - self.min.x, origin.y - self.min.y);
+        let from = origin - self.min;
         let inverse = Point::new(1.0 / direction.x, 1.0 / direction.y);
+        let Some((enter, leave)) = self.clip(from, direction, inverse, limit) else { return };
+        let at = from + direction * enter;
+        let (ix, iy) = (cell_at(at.x, self.columns), cell_at(at.y, self.rows));
+        let mut x = Crossing::new(ix, self.columns, from.x, direction.x, inverse.x);
+        let mut y = Crossing::new(iy, self.rows, from.y, direction.y, inverse.y);
+        let mut cell = (iy * self.columns + ix) as usize;
+        loop {
+            let sideways = x.out < y.out;
+            let out = if sideways { x.out } else { y.out };
+            if visit(cell, out) || out >= leave {
+                return;
+            }
+            let goes_on = if sideways { x.step(&mut cell, 1) } else { y.step(&mut cell, self.columns) };
+            if !goes_on {
+                return;
+            }
+        }
+    }
+
+    /// The `t` between which a ray may be in the grid; nothing when it passes by.
+    #[inline]
+    fn clip(&self, from: Point, direction: Point, inverse: Point, limit: f64) -> Option<(f64, f64)> {
+        let size = Point::new(f64::from(self.columns) * CELL, f64::from(self.rows) * CELL);
+        // A ray from inside ends at the border by itself; only a robot that got lost casts one from outside.
+        if from.x >= 0.0 && from.x <= size.x && from.y >= 0.0 && from.y <= size.y {
+            return Some((0.0, limit));
+        }
         let (mut enter, mut leave) = (0.0f64, limit);
-        for (o, d, inv, size) in [(ox, direction.x, inverse.x, width), (oy, direction.y, inverse.y, height)] {
+        for (o, d, inv, size) in
+            [(from.x, direction.x, inverse.x, size.x), (from.y, direction.y, inverse.y, size.y)]
+        {
             if d == 0.0 {
                 if o < 0.0 || o > size {
-                    return;
+                    return None;
                 }
             } else {
                 let (a, b) = (-o * inv, (size - o) * inv);
@@ -288,41 +357,7 @@ impl Field {
                 leave = leave.min(a.max(b));
             }
         }
-        if enter > leave {
-            return;
-        }
-        let last = (i64::from(self.columns) - 1, i64::from(self.rows) - 1);
-        let mut ix = (((ox + direction.x * enter) / CELL) as i64).clamp(0, last.0);
-        let mut iy = (((oy + direction.y * enter) / CELL) as i64).clamp(0, last.1);
-        let axis = |i: i64, o: f64, d: f64, inv: f64| {
-            if d == 0.0 {
-                (f64::INFINITY, f64::INFINITY, 0)
-            } else {
-                let border = (i + i64::from(d > 0.0)) as f64 * CELL;
-                ((border - o) * inv, CELL * fabs(inv), if d > 0.0 { 1 } else { -1 })
-            }
-        };
-        let (mut tx, dtx, step_x) = axis(ix, ox, direction.x, inverse.x);
-        let (mut ty, dty, step_y) = axis(iy, oy, direction.y, inverse.y);
-        loop {
-            let out = tx.min(ty);
-            if visit((iy * i64::from(self.columns) + ix) as usize, out) || out >= leave {
-                return;
-            }
-            if tx < ty {
-                ix += step_x;
-                tx += dtx;
-                if ix < 0 || ix > last.0 {
-                    return;
-                }
-            } else {
-                iy += step_y;
-                ty += dty;
-                if iy < 0 || iy > last.1 {
-                    return;
-                }
-            }
-        }
+        (enter <= leave).then_some((enter, leave))
     }
 
     /// The faces of one cell.
@@ -444,17 +479,21 @@ impl Field {
 
     /// Visits upright edges and small round things around a rectangle of cells; each may come more than once.
     pub(crate) fn scatterers(&self, min: Point, max: Point, mut visit: impl FnMut(Scatterer)) {
-        for cell in self.cells(self.block(min, max)) {
-            let (from, to) = (self.edge_start[cell] as usize, self.edge_start[cell + 1] as usize);
-            for &index in &self.edges_in[from..to] {
+        let Block { first, last } = self.block(min, max);
+        for row in first.1..=last.1 {
+            // Cells of a row lie one after another, and so does what is in them.
+            let cells = (row * self.columns + first.0) as usize..(row * self.columns + last.0 + 1) as usize;
+            let within = |start: &[u32]| start[cells.start] as usize..start[cells.end] as usize;
+            for &index in &self.edges_in[within(&self.edge_start)] {
                 visit(Scatterer::Edge(index));
             }
-            let flags = self.flags[cell];
-            if flags & HAS_STATIC != 0 {
-                self.posts_of(cell).iter().for_each(|&index| visit(Scatterer::Post(index)));
+            for &index in &self.posts_in[within(&self.post_start)] {
+                visit(Scatterer::Post(index));
             }
-            if flags & HAS_BODY != 0 {
-                self.bodies_in[cell].iter().for_each(|&index| visit(Scatterer::Body(index)));
+            for cell in cells {
+                if self.flags[cell] & HAS_BODY != 0 {
+                    self.bodies_in[cell].iter().for_each(|&index| visit(Scatterer::Body(index)));
+                }
             }
         }
     }
@@ -496,7 +535,8 @@ mod tests {
             let circle = Circle { centre, radius: draw.between(6, 0.02, 0.9) };
             posts.push(Post { circle, low: 0.0, high: 1.0, look: 0 });
         }
-        let mut field = Field::new(faces, posts, Vec::new());
+        let edges = faces.iter().map(|face| (face.segment.a, 0.0, 1.0)).collect();
+        let mut field = Field::new(faces, posts, edges);
         for k in 0..20 {
             let draw = stream.sample(1000 + k);
             let circle = Circle { centre: Point::new(0.0, 0.0), radius: 0.3 };
@@ -525,12 +565,37 @@ mod tests {
     proptest::proptest! {
         #[test]
         fn the_walk_finds_what_a_search_of_everything_finds(
-            x in -9f64..9., y in -9f64..9., angle in 0f64..TAU, limit in 0.1f64..20.
+            x in -18f64..18., y in -18f64..18., angle in 0f64..TAU, limit in 0.1f64..40.
         ) {
+            // Places inside the grid and outside of it.
             let field = crowd();
             let (origin, direction) = (Point::new(x, y), Point::polar(1.0, angle));
             let found = field.cast(origin, direction, limit, 0.5, NOBODY).map_or(limit, |hit| hit.t);
             proptest::prop_assert_eq!(found, by_hand(&field, origin, direction, limit));
+        }
+
+        #[test]
+        fn a_rectangle_gives_all_that_scatters_in_it(
+            x in -12f64..12., y in -12f64..12., wide in 0f64..9., high in 0f64..9.
+        ) {
+            let field = crowd();
+            let (min, max) = (Point::new(x, y), Point::new(x + wide, y + high));
+            let inside = |p: Point| min.x <= p.x && p.x <= max.x && min.y <= p.y && p.y <= max.y;
+            let mut seen = [[false; 60]; 3];
+            field.scatterers(min, max, |what| match what {
+                Scatterer::Edge(k) => seen[0][k as usize] = true,
+                Scatterer::Post(k) => seen[1][k as usize] = true,
+                Scatterer::Body(k) => seen[2][k as usize] = true,
+            });
+            for (k, edge) in field.edges.iter().enumerate() {
+                proptest::prop_assert!(seen[0][k] || !inside(edge.0), "edge {}", k);
+            }
+            for (k, post) in field.posts.iter().enumerate() {
+                proptest::prop_assert!(seen[1][k] || !inside(post.circle.centre), "post {}", k);
+            }
+            for (k, body) in field.bodies.iter().enumerate() {
+                proptest::prop_assert!(seen[2][k] || !inside(body.circle.centre), "body {}", k);
+            }
         }
 
         #[test]

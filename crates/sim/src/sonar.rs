@@ -9,6 +9,7 @@ use types::Point;
 
 use crate::field::{Field, Met, Scatterer};
 use crate::model::Sonar;
+use crate::shape::Circle;
 use types::chance::Stream;
 
 /// Rays of a fan. With 5° between them the range of a face errs by less than 0.1 %.
@@ -80,25 +81,8 @@ impl Fan {
         let corners = [origin, far + side, far - side];
         let min = corners.iter().fold(origin, |min, p| Point::new(min.x.min(p.x), min.y.min(p.y)));
         let max = corners.iter().fold(origin, |max, p| Point::new(max.x.max(p.x), max.y.max(p.y)));
-        field.scatterers(min, max, |what| {
-            let (centre, radius, low, high) = match what {
-                Scatterer::Edge(index) => {
-                    let (point, low, high) = field.edges[index as usize];
-                    (point, 0.0, low, high)
-                }
-                Scatterer::Post(index) => {
-                    let post = &field.posts[index as usize];
-                    (post.circle.centre, post.circle.radius, post.low, post.high)
-                }
-                Scatterer::Body(index) => {
-                    let other = &field.bodies[index as usize];
-                    if index == body || !other.present {
-                        return;
-                    }
-                    (other.circle.centre, other.circle.radius, 0.0, other.high)
-                }
-            };
-            let to = centre - origin;
+        let mut offer = |circle: Circle, low: f64, high: f64| {
+            let to = circle.centre - origin;
             let forward = to.dot(axis);
             if forward <= 0.0
                 || libm::fabs(to.cross(axis)) > forward * self.tangent
@@ -108,7 +92,7 @@ impl Fan {
                 return;
             }
             let distance = sqrt(to.dot(to));
-            let range = distance - radius;
+            let range = distance - circle.radius;
             // A hair short of the surface: the thing itself must not hide itself.
             if range > 0.0
                 && range < *best
@@ -116,11 +100,27 @@ impl Fan {
             {
                 *best = range;
             }
+        };
+        field.scatterers(min, max, |what| match what {
+            Scatterer::Edge(index) => {
+                let (centre, low, high) = field.edges[index as usize];
+                offer(Circle { centre, radius: 0.0 }, low, high);
+            }
+            Scatterer::Post(index) => {
+                let post = &field.posts[index as usize];
+                offer(post.circle, post.low, post.high);
+            }
+            Scatterer::Body(index) => {
+                let other = &field.bodies[index as usize];
+                if index != body && other.present {
+                    offer(other.circle, 0.0, other.high);
+                }
+            }
         });
     }
 }
 
-fn outward(circle: crate::shape::Circle, point: Point) -> Point {
+fn outward(circle: Circle, point: Point) -> Point {
     (point - circle.centre) * (1.0 / circle.radius)
 }
 
