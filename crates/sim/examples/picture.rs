@@ -5,6 +5,7 @@ use std::fs::File;
 use std::io::BufWriter;
 use std::path::Path;
 
+use sim::camera::Canvas;
 use sim::{Model, Simulator, Vary};
 use types::value::Table;
 use types::{Point, Pose};
@@ -55,7 +56,7 @@ fn main() -> Result<(), Box<dyn Error>> {
 
 fn view(simulator: &Simulator, id: sim::RobotId, path: &Path) -> Result<(), Box<dyn Error>> {
     let mut image = vec![0u8; 320 * 240 * 3];
-    let (width, height) = simulator.render(id, 0, &mut image).ok_or("no camera")?;
+    let (width, height) = simulator.render(id, 0, &mut Canvas::default(), &mut image).ok_or("no camera")?;
     save(path, width, height, &image)
 }
 

@@ -8,15 +8,14 @@
 //! What a column meets becomes spans of one colour, drawn from far to near.
 
 use libm::{cos, round, sin, sqrt, tan};
-use types::{Point, Pose};
+use types::Point;
 
 use crate::colour::Colour;
 use crate::field::Field;
 use crate::model::Camera;
 use crate::outline::{Look, UNSEEN};
-use crate::people::Walker;
 use crate::plan::{Person, Thing};
-use crate::robot::{HeadState, Robot};
+use crate::robot::Robot;
 use crate::shape::Circle;
 use crate::simulator::{RobotId, Simulator};
 use types::chance::Stream;
@@ -196,54 +195,75 @@ fn write_tile(tile: &[u32], image: &mut [u8], stride: usize, from: usize) {
     let columns = a.iter().zip(b).zip(c).zip(d);
     for (row, (((a, b), c), d)) in image.chunks_exact_mut(stride).zip(columns) {
         let (left, right) = (pair(*a, *b), pair(*c, *d));
-        if from + 3 * TILE + 2 <= stride {
-            row[from..from + 8].copy_from_slice(&left);
-            row[from + 6..from + 14].copy_from_slice(&right);
+        let place = &mut row[from..];
+        if let Some(place) = place.first_chunk_mut::<{ 3 * TILE + 2 }>() {
+            place[..8].copy_from_slice(&left);
+            place[6..].copy_from_slice(&right);
         } else {
             // The last columns end with the row.
             let bytes = left[..6].iter().chain(&right[..6]);
-            row[from..].iter_mut().zip(bytes).for_each(|(out, byte)| *out = *byte);
+            place.iter_mut().zip(bytes).for_each(|(out, byte)| *out = *byte);
         }
     }
 }
 
-/// Something upright and round that is not part of the walls.
-enum Sprite<'a> {
-    Person(&'a Walker),
-    Robot(&'a Robot),
-    Ball(&'a Thing, Point),
+/// Something upright and round that is not part of the walls: whose it is, by its place in the world.
+#[derive(Clone, Copy, Debug)]
+enum Sprite {
+    Person(usize),
+    Robot(usize),
+    Thing(usize),
+    /// What a person carries, and where.
+    Carried(usize, Point),
+}
+
+/// The memory in which pictures are made. It is kept from one picture to the next, so that no picture asks for more.
+#[derive(Clone, Debug, Default)]
+pub struct Canvas {
+    /// Floor and ceiling: a column of pixels.
+    background: Vec<u32>,
+    tile: Vec<u32>,
+    sprites: Vec<Sprite>,
 }
 
 impl Simulator {
     /// Takes the picture of a robot's camera: red, green and blue bytes, row by row from the top.
     ///
-    /// Gives its width and height; nothing when the robot has no camera or `image` is not width × height × 3 bytes long.
-    pub fn render(&self, id: RobotId, sample: u64, image: &mut [u8]) -> Option<(u32, u32)> {
+    /// Gives its width and height; nothing when the robot has no camera or `image` is not width × height × 3 bytes long. The
+    /// `canvas` may come from any other picture.
+    pub fn render(
+        &self,
+        id: RobotId,
+        sample: u64,
+        canvas: &mut Canvas,
+        image: &mut [u8],
+    ) -> Option<(u32, u32)> {
         let robot = &self.robots[id.index()];
         let camera = robot.model.camera.as_ref()?;
         let stride = camera.width as usize * 3;
         if image.len() != stride * camera.height as usize {
             return None;
         }
-        let eye = robot.truth.pose;
-        self.draw_view(camera, eye, robot.head, robot.body, image);
+        self.draw_view(camera, robot, canvas, image);
         if camera.noise > 0.0 {
             self.noise.add(camera.noise, robot.streams.camera.sample(sample), image, stride);
         }
         Some((camera.width, camera.height))
     }
 
-    fn draw_view(&self, camera: &Camera, eye: Pose, head: HeadState, own: u32, image: &mut [u8]) {
+    fn draw_view(&self, camera: &Camera, robot: &Robot, canvas: &mut Canvas, image: &mut [u8]) {
         let stride = camera.width as usize * 3;
-        let view = Pinhole::new(camera, head.tilt);
+        let view = Pinhole::new(camera, robot.head.tilt);
         let light = self.plan.light;
-        let background = self.floor_and_ceiling(view, light, camera.height);
-        let rows = background.len();
-        let mut tile = background.repeat(TILE);
-        let yaw = eye.heading + head.pan;
+        let eye = robot.truth.pose.position();
+        let yaw = robot.truth.pose.heading + robot.head.pan;
         let forward = Point::new(cos(yaw), sin(yaw));
         let right = Point::new(forward.y, -forward.x);
-        let sprites = self.sprites(eye.position(), forward, own);
+        let Canvas { background, tile, sprites } = canvas;
+        self.floor_and_ceiling(view, light, camera.height, background);
+        self.find_sprites(eye, forward, robot.body, sprites);
+        let rows = background.len();
+        tile.resize(TILE * rows, 0);
         let mut column = Column {
             spans: [NO_SPAN; SPANS],
             count: 0,
@@ -256,21 +276,21 @@ impl Simulator {
             let u = (x as f64 + 0.5 - view.middle) / view.focal;
             let ray = forward + right * u;
             column.stretch = sqrt(1.0 + u * u);
-            walls(&self.field, &self.looks, self.plan.ceiling_height, eye.position(), ray, &mut column);
-            for sprite in &sprites {
-                sprite.draw(eye.position(), ray, &mut column);
+            walls(&self.field, &self.looks, self.plan.ceiling_height, eye, ray, &mut column);
+            for sprite in sprites.iter() {
+                sprite.draw(self, eye, ray, &mut column);
             }
             let pixels = &mut tile[x % TILE * rows..(x % TILE + 1) * rows];
-            pixels.copy_from_slice(&background);
+            pixels.copy_from_slice(background);
             column.draw(pixels);
             if x % TILE == TILE - 1 || x + 1 == camera.width as usize {
-                write_tile(&tile, image, stride, x / TILE * TILE * 3);
+                write_tile(tile, image, stride, x / TILE * TILE * 3);
             }
         }
     }
 
     /// Floor and ceiling: a column of pixels.
-    fn floor_and_ceiling(&self, view: Pinhole, light: f64, rows: u32) -> Vec<u32> {
+    fn floor_and_ceiling(&self, view: Pinhole, light: f64, rows: u32, column: &mut Vec<u32>) {
         let row = |y: u32| {
             let slope = (view.horizon - (f64::from(y) + 0.5)) / view.focal;
             let (colour, height) = if slope > 0.0 {
@@ -281,28 +301,29 @@ impl Simulator {
             let depth = (height / slope.abs().max(1e-6)).clamp(0.0, 1000.0);
             packed(colour.lit((light * HALF_LIGHT / (HALF_LIGHT + depth)) as f32))
         };
-        (0..rows).map(row).collect()
+        column.clear();
+        column.extend((0..rows).map(row));
     }
 
     /// What moves or is round and may be in the picture.
-    fn sprites(&self, eye: Point, forward: Point, own: u32) -> Vec<Sprite<'_>> {
+    fn find_sprites(&self, eye: Point, forward: Point, own: u32, sprites: &mut Vec<Sprite>) {
         let ahead = |at: Point, radius: f64| {
             let to = at - eye;
             let depth = to.dot(forward);
             depth > -radius && depth < FAR && libm::fabs(to.cross(forward)) < FAR
         };
-        let mut sprites = Vec::new();
-        for walker in self.people.iter().filter(|walker| walker.present && ahead(walker.at, 1.0)) {
-            sprites.push(Sprite::Person(walker));
-            if let (Some(thing), Some(at)) = (&walker.plan.carries, walker.hands()) {
-                sprites.push(Sprite::Ball(thing, at));
+        sprites.clear();
+        for (k, walker) in self.people.iter().enumerate() {
+            if walker.present && ahead(walker.at, 1.0) {
+                sprites.push(Sprite::Person(k));
+                sprites.extend(walker.hands().map(|at| Sprite::Carried(k, at)));
             }
         }
-        let robots = self.robots.iter().filter(|robot| robot.body != own);
-        sprites.extend(robots.filter(|robot| ahead(robot.truth.pose.position(), 1.0)).map(Sprite::Robot));
-        let things = self.plan.things.iter().filter(|thing| ahead(thing.at, thing.radius));
-        sprites.extend(things.map(|thing| Sprite::Ball(thing, thing.at)));
-        sprites
+        let robots = self.robots.iter().enumerate().filter(|(_, robot)| robot.body != own);
+        let robots = robots.filter(|(_, robot)| ahead(robot.truth.pose.position(), 1.0));
+        sprites.extend(robots.map(|(k, _)| Sprite::Robot(k)));
+        let things = self.plan.things.iter().enumerate().filter(|(_, thing)| ahead(thing.at, thing.radius));
+        sprites.extend(things.map(|(k, _)| Sprite::Thing(k)));
     }
 }
 
@@ -420,12 +441,20 @@ fn cylinder(circle: Circle, eye: Point, ray: Point) -> Option<(f64, f64, f64)> {
     Some((near, far, 0.62 + 0.38 * facing))
 }
 
-impl Sprite<'_> {
-    fn draw(&self, eye: Point, ray: Point, column: &mut Column) {
+impl Sprite {
+    fn draw(self, world: &Simulator, eye: Point, ray: Point, column: &mut Column) {
         match self {
-            Sprite::Person(walker) => person(&walker.plan, walker.at, walker.facing, eye, ray, column),
-            Sprite::Robot(robot) => machine(robot, eye, ray, column),
-            Sprite::Ball(thing, at) => ball(*at, thing.height, thing.radius, thing.colour, eye, ray, column),
+            Sprite::Person(k) => {
+                let walker = &world.people[k];
+                person(&walker.plan, walker.at, walker.facing, eye, ray, column);
+            }
+            Sprite::Robot(k) => machine(&world.robots[k], eye, ray, column),
+            Sprite::Thing(k) => ball(&world.plan.things[k], world.plan.things[k].at, eye, ray, column),
+            Sprite::Carried(k, at) => {
+                if let Some(thing) = &world.people[k].plan.carries {
+                    ball(thing, at, eye, ray, column);
+                }
+            }
         }
     }
 }
@@ -492,7 +521,8 @@ fn machine(robot: &Robot, eye: Point, ray: Point, column: &mut Column) {
 }
 
 /// A ball in three bands of light.
-fn ball(at: Point, height: f64, radius: f64, colour: Colour, eye: Point, ray: Point, column: &mut Column) {
+fn ball(thing: &Thing, at: Point, eye: Point, ray: Point, column: &mut Column) {
+    let &Thing { height, radius, colour, .. } = thing;
     let Some((top, bottom, depth, lit)) = ball_rows(at, height, radius, eye, ray, column) else { return };
     let light = column.light_at(depth) * lit;
     let row = |part: f64| top + (bottom - top) * part;

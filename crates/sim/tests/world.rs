@@ -1,6 +1,6 @@
 //! The simulator from outside: closed forms, statistics, determinism, and the worlds that come with the program.
 
-use sim::camera::Pinhole;
+use sim::camera::{Canvas, Pinhole};
 use sim::model::{Camera, Sonar};
 use sim::plan::{Leg, Person, Region, Round, Thing, Wall};
 use sim::vary::FREE_WIDTH;
@@ -346,7 +346,7 @@ fn a_red_ball_covers_the_pixels_of_the_pinhole() {
         world.command_head(id, pan, tilt);
         world.run_until(Time::from_seconds(1.0));
         let mut image = vec![0u8; 320 * 240 * 3];
-        assert_eq!(world.render(id, 0, &mut image), Some((320, 240)));
+        assert_eq!(world.render(id, 0, &mut Canvas::default(), &mut image), Some((320, 240)));
         let [left, right, top, bottom] = red(&image, 320).unwrap();
         // The ball at the height of the camera is seen under ± asin(r / d) to either side.
         let half = (radius / distance).asin();
@@ -370,7 +370,7 @@ fn what_stands_in_front_hides_what_is_behind() {
     let seen = |plan: &WorldPlan| {
         let (world, id) = alone(plan, exact(), Pose::new(1.0, 2.0, 0.0));
         let mut image = vec![0u8; 320 * 240 * 3];
-        world.render(id, 0, &mut image).unwrap();
+        world.render(id, 0, &mut Canvas::default(), &mut image).unwrap();
         red(&image, 320).is_some()
     };
     assert!(seen(&plan));
@@ -385,15 +385,34 @@ fn what_stands_in_front_hides_what_is_behind() {
 }
 
 #[test]
+fn a_canvas_keeps_nothing_of_the_picture_before() {
+    let mut plan = WorldPlan::hall(8.0, 4.0);
+    plan.people.push(Person { at: Point::new(3.0, 2.0), ..Person::default() });
+    let picture = |width: u32, height: u32, heading: f64, canvas: &mut Canvas| {
+        let camera = Camera { width, height, ..Camera::default() };
+        let (world, id) =
+            alone(&plan, Model { camera: Some(camera), ..exact() }, Pose::new(1.0, 2.0, heading));
+        let mut image = vec![0u8; (width * height * 3) as usize];
+        world.render(id, 0, canvas, &mut image).unwrap();
+        image
+    };
+    let mut kept = Canvas::default();
+    for (width, height, heading) in [(320, 240, 0.0), (81, 50, PI), (33, 60, 0.1), (320, 240, PI)] {
+        let image = picture(width, height, heading, &mut kept);
+        assert_eq!(image, picture(width, height, heading, &mut Canvas::default()), "{width} x {height}");
+    }
+}
+
+#[test]
 fn the_noise_of_a_picture_has_its_deviation() {
     let mut model = exact();
     let (clear, id) = alone(&WorldPlan::hall(6.0, 4.0), model.clone(), Pose::new(2.0, 2.0, 0.0));
     model.camera = Some(Camera { noise: 5.0, ..Camera::default() });
     let (noisy, _) = alone(&WorldPlan::hall(6.0, 4.0), model, Pose::new(2.0, 2.0, 0.0));
     let mut images = [vec![0u8; 320 * 240 * 3], vec![0u8; 320 * 240 * 3], vec![0u8; 320 * 240 * 3]];
-    clear.render(id, 0, &mut images[0]).unwrap();
-    noisy.render(id, 0, &mut images[1]).unwrap();
-    noisy.render(id, 1, &mut images[2]).unwrap();
+    clear.render(id, 0, &mut Canvas::default(), &mut images[0]).unwrap();
+    noisy.render(id, 0, &mut Canvas::default(), &mut images[1]).unwrap();
+    noisy.render(id, 1, &mut Canvas::default(), &mut images[2]).unwrap();
     assert_ne!(images[1], images[2]);
     let (mut sum, mut square) = (0.0, 0.0);
     for (a, b) in images[0].iter().zip(&images[1]) {
@@ -417,13 +436,14 @@ fn listening_changes_no_world() {
         let mut world = Simulator::new(&plan, 77);
         let id = world.add_robot("h1", model, Pose::new(9.0, 3.0, 1.5)).unwrap();
         let (mut sonar, mut scan, mut image) = ([0.0f32; 12], [0.0f32; 180], vec![0u8; 320 * 240 * 3]);
+        let mut canvas = Canvas::default();
         for k in 0..400u64 {
             world.command_wheels(id, 4.0, 4.3);
             if listen {
                 world.sonar(id, k, &mut sonar);
                 world.scan(id, k, &mut scan);
                 world.gyro(id, k);
-                world.render(id, k, &mut image);
+                world.render(id, k, &mut canvas, &mut image);
             }
             world.step();
         }

@@ -14,6 +14,7 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use motion::Differential;
 use motion::limits::Limits;
+use sim::camera::Canvas;
 use sim::{Goal, Model, RobotId, WorldPlan};
 use types::messages::{
     Battery, Bumper, Echo, Echoes, Encoding, Gyro, Head, Image, LaserScan, Twist, WheelTicks,
@@ -174,6 +175,7 @@ pub struct Simulated {
     /// A scan without its ranges.
     scan: LaserScan,
     image: Image,
+    canvas: Canvas,
     wheels: WheelTicks,
     pressed: u32,
 }
@@ -199,6 +201,7 @@ impl Simulated {
             echoes: empty_ring(model),
             scan: empty_scan(model),
             image: empty_image(model),
+            canvas: Canvas::default(),
             wheels: WheelTicks {
                 ticks_per_turn: model.drive.ticks_per_turn,
                 wheel_radius: model.drive.wheel_radius,
@@ -302,11 +305,11 @@ impl Driver for Simulated {
             });
         }
         if let Some(sample) = due.image.due(time).filter(|_| wanted.image) {
-            let form = self.image;
+            let (form, canvas) = (self.image, &mut self.canvas);
             sink.image(stamp, &mut |head, room| {
                 *head = form;
                 let Some(bytes) = room.get_mut(..form.len()) else { return 0 };
-                sim.render(id, sample, bytes).map_or(0, |_| form.len())
+                sim.render(id, sample, canvas, bytes).map_or(0, |_| form.len())
             });
         }
         Ok(Polled { pressed, newly_pressed, next: None, ended: false })
