@@ -292,6 +292,12 @@ impl Simulator {
         })
     }
 
+    /// Where the person of this number in the plan is, and the middle of what the person carries (m); nothing while hidden.
+    pub fn person(&self, index: usize) -> Option<(Point, Option<Point>)> {
+        let walker = self.people.get(index).filter(|walker| walker.present)?;
+        Some((walker.at, walker.hands()))
+    }
+
     /// Whether the person of this name walked in the last step.
     pub fn walks(&self, name: &str) -> bool {
         self.people.iter().any(|walker| walker.present && walker.walking && walker.plan.name == name)

@@ -89,12 +89,10 @@ impl Moment {
     }
 
     fn take_people(&mut self, simulator: &Simulator) {
-        for (person, moment) in simulator.plan().people.iter().zip(&mut self.people) {
-            let place = simulator.locate(&person.name).map(|(at, _)| at);
+        for (index, moment) in self.people.iter_mut().enumerate() {
+            let place = simulator.person(index);
             moment.present = place.is_some();
-            let Some(at) = place else { continue };
-            let carried =
-                person.carries.as_ref().and_then(|thing| simulator.locate(&thing.name)).map(|(at, _)| at);
+            let Some((at, carried)) = place else { continue };
             let way = carried.map_or(at - moment.at, |thing| thing - at);
             if way.norm() > 1e-6 {
                 moment.facing = way.bearing();
