@@ -4,7 +4,7 @@
 //!  offers ──▶ × weight of the decision ──▶ veto of safety ──▶ fusion ──▶ command
 //! ```
 
-use motion::fusion::{Cause, Fused, Held, Inference, Moment, Parameters, Veto, fuse};
+use motion::fusion::{Cause, Held, Inference, Moment, Parameters, Veto, fuse};
 use runtime::{Agent, Fault, Input, Output, Step};
 use types::messages::{Decision, Odometry, Offer, Safety, Twist};
 use types::params::Params;
@@ -88,9 +88,9 @@ impl Agent for Coordinator {
         if let Some(odometry) = self.odometry.latest() {
             self.council.motion = odometry.twist;
         }
-        let fused = self.council.command(&self.params, self.safety.is_wired(), step.now);
+        let command = self.council.command(&self.params, self.safety.is_wired(), step.now);
         // After a silence the zero is sent as well: the drive need not wait until the last command is too old.
-        self.command.send(fused.twist);
+        self.command.send(command);
         Ok(())
     }
 }
@@ -113,21 +113,20 @@ impl Council {
         self.weights = rows.filter_map(|row| Some((find(row.agent.as_str())?, row.weight))).collect();
     }
 
-    fn command(&mut self, params: &CoordinatorParams, guarded: bool, now: Time) -> Fused {
-        let weights = self.weights;
-        let weight = |sender: AgentId| {
-            weights.iter().find(|(known, _)| *known == sender).map_or(params.unlisted, |(_, weight)| *weight)
-        };
-        let (offers, len) = self.offers.weighed(weight);
-        self.offers.forget_expired(now);
+    fn command(&mut self, params: &CoordinatorParams, guarded: bool, now: Time) -> Twist {
         let moment = Moment { now, present: self.motion, veto: self.veto(params, guarded, now) };
-        let fused = fuse(&params.fusion(), &offers[..len], &moment, &mut self.held);
+        let weights = &self.weights;
+        let offers = self.offers.weighed(|sender| {
+            weights.iter().find(|(known, _)| *known == sender).map_or(params.unlisted, |(_, weight)| *weight)
+        });
+        let fused = fuse(&params.fusion(), offers, &moment, &mut self.held);
+        self.offers.forget_expired(now);
         let silent = fused.cause == Cause::Silence;
         if silent && !self.silent {
             runtime::note!("nobody offers a command that counts: stop");
         }
         self.silent = silent;
-        fused
+        fused.twist
     }
 
     fn veto(&self, params: &CoordinatorParams, guarded: bool, now: Time) -> Veto {
@@ -184,7 +183,7 @@ mod tests {
     #[test]
     fn the_decision_says_whose_wish_counts() {
         let params = CoordinatorParams::default();
-        let drive = |rows: &[(&str, f64)]| council(rows).command(&params, false, Time::ZERO).twist;
+        let drive = |rows: &[(&str, f64)]| council(rows).command(&params, false, Time::ZERO);
         assert_eq!(drive(&[("safety", 1.0), ("wall", 0.0)]), Twist::new(0.0, 0.7));
         assert_eq!(drive(&[("safety", 0.0), ("wall", 1.0)]), Twist::new(0.4, -0.2));
         assert_eq!(drive(&[("safety", 0.0)]), Twist::new(0.4, -0.2), "who is not listed counts");
@@ -206,15 +205,15 @@ mod tests {
     fn safety_forbids_to_move_but_not_to_turn_and_its_silence_does_too() {
         let params = CoordinatorParams::default();
         let mut council = council(&[("safety", 0.0), ("wall", 1.0)]);
-        assert_eq!(council.command(&params, true, Time::ZERO).twist, Twist::new(0.0, -0.2), "unheard");
+        assert_eq!(council.command(&params, true, Time::ZERO), Twist::new(0.0, -0.2), "unheard");
         let allowed = Safety { linear_max: 0.3, ..Safety::default() };
         council.safety = Some(Dated { value: allowed, stamp: Time::ZERO });
-        assert_eq!(council.command(&params, true, Time::ZERO).twist, Twist::new(0.3, -0.2));
+        assert_eq!(council.command(&params, true, Time::ZERO), Twist::new(0.3, -0.2));
         let late = Time::ZERO + params.safety_age + Duration::nanos(1);
-        assert_eq!(council.command(&params, true, late).twist, Twist::new(0.0, -0.2), "too old");
+        assert_eq!(council.command(&params, true, late), Twist::new(0.0, -0.2), "too old");
         let blind = Safety { blind: true, linear_max: 0.3, ..Safety::default() };
         council.safety = Some(Dated { value: blind, stamp: Time::ZERO });
-        assert_eq!(council.command(&params, true, Time::ZERO).twist, Twist::new(0.0, -0.2), "blind");
+        assert_eq!(council.command(&params, true, Time::ZERO), Twist::new(0.0, -0.2), "blind");
     }
 
     #[test]
@@ -223,10 +222,7 @@ mod tests {
         let mut council = council(&[("safety", 0.0), ("wall", 1.0)]);
         let end = Time::from_seconds(1.0);
         council.command(&params, false, end);
-        assert_eq!(council.command(&params, false, end + params.hold).twist.linear, 0.4);
-        assert_eq!(
-            council.command(&params, false, end + params.hold + Duration::nanos(1)).twist,
-            Twist::ZERO
-        );
+        assert_eq!(council.command(&params, false, end + params.hold).linear, 0.4);
+        assert_eq!(council.command(&params, false, end + params.hold + Duration::nanos(1)), Twist::ZERO);
     }
 }

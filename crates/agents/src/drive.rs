@@ -176,9 +176,9 @@ impl Hands {
     /// The orders of people while one holds, else the wish of the coordinator while it is fresh, else nothing.
     fn wanted(&mut self, params: &DriveParams, veto: &Veto, now: Time) -> Twist {
         self.orders.forget_expired(now);
-        let (orders, len) = self.orders.weighed(|_| 1.0);
         let moment = Moment { now, present: self.motion.unwrap_or(self.commanded), veto: *veto };
-        let fused = fuse(&params.fusion(), &orders[..len], &moment, &mut Held::default());
+        let orders = self.orders.weighed(|_| 1.0);
+        let fused = fuse(&params.fusion(), orders, &moment, &mut Held::default());
         match fused.cause {
             Cause::Offers | Cause::Stop => fused.twist,
             Cause::Held | Cause::Silence => {

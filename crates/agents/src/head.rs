@@ -103,7 +103,6 @@ impl Neck {
     /// Rates that people order: pan as the turn rate, tilt as the speed.
     fn ordered(&mut self, params: &HeadParams, now: Time) -> Option<Twist> {
         self.orders.forget_expired(now);
-        let (orders, len) = self.orders.weighed(|_| 1.0);
         let fusion = fusion::Parameters {
             actuator: Actuator::Head,
             linear_max: params.word_rate,
@@ -112,7 +111,7 @@ impl Neck {
             ..fusion::Parameters::default()
         };
         let moment = Moment { now, present: Twist::ZERO, veto: Veto::NONE };
-        let fused = fuse(&fusion, &orders[..len], &moment, &mut Held::default());
+        let fused = fuse(&fusion, self.orders.weighed(|_| 1.0), &moment, &mut Held::default());
         matches!(fused.cause, Cause::Offers | Cause::Stop).then_some(fused.twist)
     }
 }

@@ -88,7 +88,9 @@ impl<T: Copy> Dated<T> {
 /// The last offer of each sender. A newer one replaces the older one of the same sender.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Offers {
-    rows: [(AgentId, Offer); SHARES_MAX],
+    senders: [AgentId; SHARES_MAX],
+    /// What each of them offers, with the weight that was last given to it. They lie as they are fused, so that nothing is copied.
+    rows: [(Offer, f64); SHARES_MAX],
     len: usize,
     /// Offers that found no place among those that still hold.
     pub(crate) turned_away: u64,
@@ -96,30 +98,39 @@ pub(crate) struct Offers {
 
 impl Default for Offers {
     fn default() -> Offers {
-        Offers { rows: [(AgentId::NONE, Offer::default()); SHARES_MAX], len: 0, turned_away: 0 }
+        Offers {
+            senders: [AgentId::NONE; SHARES_MAX],
+            rows: [(Offer::default(), 0.0); SHARES_MAX],
+            len: 0,
+            turned_away: 0,
+        }
     }
 }
 
 impl Offers {
     /// Keeps an offer. With all places taken it replaces one that has expired; without such a one it is turned away and counted.
     pub(crate) fn put(&mut self, sender: AgentId, offer: Offer, now: Time) {
-        if let Some(place) = self.rows[..self.len].iter_mut().find(|(known, _)| *known == sender) {
-            place.1 = offer;
+        let place = if let Some(known) = self.senders[..self.len].iter().position(|known| *known == sender) {
+            known
         } else if self.len < SHARES_MAX {
-            self.rows[self.len] = (sender, offer);
             self.len += 1;
-        } else if let Some(place) = self.rows.iter_mut().find(|(_, held)| held.valid_until < now) {
-            *place = (sender, offer);
+            self.len - 1
+        } else if let Some(expired) = self.rows.iter().position(|(held, _)| held.valid_until < now) {
+            expired
         } else {
             self.turned_away += 1;
-        }
+            return;
+        };
+        self.senders[place] = sender;
+        self.rows[place].0 = offer;
     }
 
     /// Drops what has expired, so that old offers are not counted again in every step.
     pub(crate) fn forget_expired(&mut self, now: Time) {
         let mut kept = 0;
         for i in 0..self.len {
-            if self.rows[i].1.valid_until >= now {
+            if self.rows[i].0.valid_until >= now {
+                self.senders[kept] = self.senders[i];
                 self.rows[kept] = self.rows[i];
                 kept += 1;
             }
@@ -128,12 +139,12 @@ impl Offers {
     }
 
     /// The offers, each with what `weight` says of its sender.
-    pub(crate) fn weighed(&self, weight: impl Fn(AgentId) -> f64) -> ([(Offer, f64); SHARES_MAX], usize) {
-        let mut out = [(Offer::default(), 0.0); SHARES_MAX];
-        for (out, (sender, offer)) in out.iter_mut().zip(&self.rows[..self.len]) {
-            *out = (*offer, weight(*sender));
+    pub(crate) fn weighed(&mut self, weight: impl Fn(AgentId) -> f64) -> &[(Offer, f64)] {
+        let rows = &mut self.rows[..self.len];
+        for ((_, weighs), sender) in rows.iter_mut().zip(&self.senders) {
+            *weighs = weight(*sender);
         }
-        (out, self.len)
+        rows
     }
 }
 

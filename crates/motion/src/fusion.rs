@@ -380,7 +380,7 @@ impl Round<'_> {
             }
         }
         normalise(&mut out.shares[..out.listed]);
-        self.infer(sums, &mut out.vetoed)
+        self.infer(&mut sums, &mut out.vetoed)
     }
 
     fn add(&self, sums: &mut Sums, wish: Wish, weight: f64, vetoed: &mut bool) {
@@ -397,7 +397,7 @@ impl Round<'_> {
     }
 
     /// Turns the words into numbers, joins them with the others, and fills in what nobody spoke of.
-    fn infer(&self, mut sums: Sums, vetoed: &mut bool) -> Twist {
+    fn infer(&self, sums: &mut Sums, vetoed: &mut bool) -> Twist {
         let Parameters { inference, linear_max, angular_max, actuator, .. } = *self.parameters;
         if let Some(value) = sums.along.value(inference) {
             sums.linear.add(self.permitted(value * linear_max, vetoed), sums.along.weight);
