@@ -2,7 +2,7 @@
 
 use crate::kinematics::Twist;
 use crate::ring::{Echo, Ring};
-use libm::{cos, fabs, fmax, fmin, sin, sqrt};
+use libm::{fabs, fmax, fmin, sincos, sqrt};
 use types::geometry::{PI, wrap};
 
 /// What the robot is and how careful it shall be.
@@ -147,7 +147,9 @@ fn way(
         speed(fmin(heard.straight, heard.curved)),
         speed(fmin(believed.straight, believed.curved) - parameters.margin),
     );
-    let (nearest, nearest_bearing) = nearest_of(parameters, raw, filtered);
+    // What is believed tells it, unless that is nothing.
+    let closest = if believed.nearest.range.is_finite() { believed.nearest } else { heard.nearest };
+    let nearest = fmax(closest.range - parameters.radius, 0.0);
     let needed = stopping_distance(fmax(present.linear, 0.0), parameters.reaction, parameters.deceleration);
     // The curve will not be driven to its end, so there is no start to be forbidden; it must be stopped in time all the same.
     let share = |needed: f64, way: f64| if way > 0.0 { needed / way } else { 1.0 };
@@ -159,22 +161,25 @@ fn way(
         danger: if blind { 1.0 } else { fmin(fmax(fmax(in_time, close), 0.0), 1.0) },
         ahead: fmin(straight, curved),
         nearest,
-        nearest_bearing,
+        nearest_bearing: closest.bearing,
     }
 }
 
-/// Free ways (m) from the body's edge.
+/// What a ring shows before the body: free ways (m) from its edge, and what is nearest on any side.
 #[derive(Clone, Copy)]
 struct Ahead {
     straight: f64,
     /// On the present curve; infinite while it goes straight.
     curved: f64,
+    /// Infinitely far where there is nothing.
+    nearest: Echo,
 }
 
-/// Free way straight on and on the present curve.
+/// Free way straight on and on the present curve, and what is nearest.
 fn ahead(parameters: &Parameters, ring: Ring<'_>, present: Twist) -> Ahead {
     let curvature = if present.linear > 0.02 { present.angular / present.linear } else { 0.0 };
-    let free = Ahead { straight: f64::INFINITY, curved: f64::INFINITY };
+    let nothing = Echo { bearing: 0.0, range: f64::INFINITY };
+    let free = Ahead { straight: f64::INFINITY, curved: f64::INFINITY, nearest: nothing };
     ring.echoes().filter(|echo| echo.range.is_finite()).fold(free, |way, echo| Ahead {
         straight: fmin(way.straight, way_straight(parameters, echo)),
         curved: if fabs(curvature) > 0.05 {
@@ -182,6 +187,7 @@ fn ahead(parameters: &Parameters, ring: Ring<'_>, present: Twist) -> Ahead {
         } else {
             way.curved
         },
+        nearest: if echo.range < way.nearest.range { echo } else { way.nearest },
     })
 }
 
@@ -204,12 +210,9 @@ fn way_straight(parameters: &Parameters, echo: Echo) -> f64 {
     }
     let echo = worst(parameters, echo, 0.0);
     // What lies beside the middle of the body or behind it is not in the way.
-    let along = echo.range * cos(echo.bearing);
-    if along <= 0.0 {
-        return f64::INFINITY;
-    }
-    let across = fabs(echo.range * sin(echo.bearing));
-    if across >= half_width {
+    let (sine, cosine) = sincos(echo.bearing);
+    let (along, across) = (echo.range * cosine, fabs(echo.range * sine));
+    if along <= 0.0 || across >= half_width {
         return f64::INFINITY;
     }
     fmax(along - sqrt(fmax(parameters.radius * parameters.radius - across * across, 0.0)), 0.0)
@@ -236,12 +239,12 @@ fn way_curved(parameters: &Parameters, echo: Echo, curvature: f64) -> f64 {
         return f64::INFINITY;
     }
     let side = if curvature > 0.0 { 1.0 } else { -1.0 };
-    // Mirrored to a left turn, seen from the centre of the turn; the robot stands straight below it.
-    let (x, y) = (echo.range * cos(echo.bearing), echo.range * sin(echo.bearing) * side - turn_radius);
-    // The last digit of the length is dear, and it counts only for what lies on the edge.
-    if fabs(sqrt(x * x + y * y) - turn_radius) > half_width + HAIR * (1.0 + turn_radius) {
+    if is_surely_off_the_curve(Echo { bearing: echo.bearing * side, ..echo }, turn_radius, half_width) {
         return f64::INFINITY;
     }
+    // Mirrored to a left turn, seen from the centre of the turn; the robot stands straight below it.
+    let (sine, cosine) = sincos(echo.bearing);
+    let (x, y) = (echo.range * cosine, echo.range * sine * side - turn_radius);
     let from_centre = libm::hypot(x, y);
     if fabs(from_centre - turn_radius) >= half_width || from_centre < 1e-9 {
         return f64::INFINITY;
@@ -257,13 +260,22 @@ fn way_curved(parameters: &Parameters, echo: Echo, curvature: f64) -> f64 {
     fmax((angle - libm::acos(fmin(fmax(cosine, -1.0), 1.0))) * turn_radius, 0.0)
 }
 
-fn nearest_of(parameters: &Parameters, raw: Ring<'_>, filtered: Ring<'_>) -> (f64, f64) {
-    let nearer =
-        |best: (f64, f64), echo: Echo| if echo.range < best.0 { (echo.range, echo.bearing) } else { best };
-    let (range, bearing) = filtered.echoes().fold((f64::INFINITY, 0.0), nearer);
-    let (range, bearing) =
-        if range.is_finite() { (range, bearing) } else { raw.echoes().fold((range, bearing), nearer) };
-    (fmax(range - parameters.radius, 0.0), bearing)
+/// Whether what lies at `echo` is not swept on a left turn of `turn_radius`, told without a sine: that is so of most of what is ahead. It
+/// says no where rounding might decide.
+///
+/// With R the radius of the turn, the square of the distance from its centre is R² + r² − 2 R r sin β.
+fn is_surely_off_the_curve(echo: Echo, turn_radius: f64, half_width: f64) -> bool {
+    let Echo { bearing, range } = echo;
+    // x − x³/6 ≤ sin x ≤ x − x³/6 + x⁵/120 for a positive x, and the other way round for a negative one.
+    let squared = bearing * bearing;
+    let (third, fifth) = (1.0 - squared / 6.0, squared * squared / 120.0);
+    let bounds = (bearing * third, bearing * (third + fifth));
+    let (low, high) = if bearing > 0.0 { bounds } else { (bounds.1, bounds.0) };
+    let wide = half_width + HAIR * (1.0 + turn_radius);
+    let outside = range * (range - 2.0 * turn_radius * high) > wide * (2.0 * turn_radius + wide);
+    let inside =
+        turn_radius > wide && range * (range - 2.0 * turn_radius * low) < -wide * (2.0 * turn_radius - wide);
+    outside || inside
 }
 
 /// Mean free way to a side (m), from 15° to 135°, none counted beyond the horizon.
@@ -286,6 +298,7 @@ fn is_narrow(parameters: &Parameters, ring: Ring<'_>) -> bool {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use libm::{cos, sin};
     use proptest::prelude::*;
     use std::vec::Vec;
 
@@ -385,7 +398,7 @@ mod tests {
         #[test]
         fn the_short_ways_to_tell_what_is_beside_change_no_bit(
             bearing in -PI..PI, range in 0.01f64..4.0, cone in 0f64..0.5, curvature in prop_oneof![-9f64..-0.05, 0.05f64..9.0],
-            edge in 0usize..4
+            edge in 0usize..6
         ) {
             let parameters = Parameters { cone, ..parameters() };
             let half_width = parameters.radius + parameters.side_margin;
@@ -393,6 +406,14 @@ mod tests {
             let range = match edge {
                 0 => half_width / sin(fmax(fabs(bearing) - cone, 0.01)),
                 1 => half_width,
+                // On the circles between which the body sweeps in the curve.
+                4 | 5 => {
+                    let along = sin(bearing) / curvature;
+                    let (across, sign) = if edge == 4 { (half_width, 1.0) } else { (-half_width, -1.0) };
+                    let gap = across * (2.0 / fabs(curvature) + across);
+                    let range = along + sign * sqrt(fmax(along * along + gap, 0.0));
+                    if range > 0.0 { range } else { half_width }
+                }
                 _ => range,
             };
             let bearing = if edge == 3 { PI / 2.0 } else { bearing };
