@@ -6,12 +6,12 @@
 //!  (robot)   └                            └─▶ change between two samples ─▶ risk
 //! ```
 
-use libm::{cos, hypot, sin};
+use libm::{hypot, sincos};
 use perception::sonar::{FilterParams, RiskParams, SonarFilter};
 use runtime::{Agent, Envelope, Fault, Input, Output, Step};
 use types::messages::{Echo, Echoes, Ranges, Risk};
 use types::params::Params;
-use types::{Time, geometry::TAU};
+use types::{Sequence, Time, geometry::TAU};
 
 use crate::shared::{Before, blank};
 
@@ -108,22 +108,29 @@ impl Agent for Sonar {
 /// look in one direction the nearer one counts. A direction into which none looks is not a number: nothing is known of it.
 pub fn around_centre(echoes: &Echoes) -> Ranges {
     let row = &echoes.echoes;
-    let reach = |echo: &Echo, range: f64| {
-        let bearing = f64::from(echo.bearing);
-        hypot(f64::from(echo.x) + range * cos(bearing), f64::from(echo.y) + range * sin(bearing)) as f32
+    let directions = directions(row);
+    let beams = row.iter().zip(directions.iter());
+    let reach = |echo: &Echo, (sine, cosine): (f64, f64), range: f64| {
+        hypot(f64::from(echo.x) + range * cosine, f64::from(echo.y) + range * sine) as f32
     };
+    let reach_of_all = |range: f64| beams.clone().map(move |(echo, way)| reach(echo, *way, range));
     let silent = f64::from(echoes.range_max);
-    let range_max = row.iter().map(|echo| reach(echo, silent)).fold(echoes.range_max, f32::max);
-    let range_min = row.iter().map(|echo| reach(echo, echoes.range_min.into())).fold(range_max, f32::min);
+    let range_max = reach_of_all(silent).fold(echoes.range_max, f32::max);
+    let range_min = reach_of_all(echoes.range_min.into()).fold(range_max, f32::min);
     let mut ranges = blank(row.len(), range_min, range_max);
-    for echo in row.iter() {
+    for (echo, way) in beams.clone() {
         let range = f64::from(echo.range);
         // What is not a number, infinite or the longest range was no echo.
-        let distance = if range < silent { reach(echo, range).min(range_max) } else { range_max };
+        let distance = if range < silent { reach(echo, *way, range).min(range_max) } else { range_max };
         let place = &mut ranges.values[perception::laser::direction_of(echo.bearing.into(), row.len())];
         *place = place.min(distance);
     }
     ranges
+}
+
+/// Sine and cosine of where each transducer looks.
+fn directions<const N: usize>(row: &Sequence<Echo, N>) -> Sequence<(f64, f64), N> {
+    row.iter().map(|echo| sincos(echo.bearing.into())).collect()
 }
 
 /// The filters behind the receiver.
@@ -163,6 +170,7 @@ impl Chain {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use libm::{cos, sin};
     use types::Duration;
 
     /// `n` transducers on the rim of a robot of 0.2 m radius.

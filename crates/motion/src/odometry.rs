@@ -1,7 +1,7 @@
 //! Dead reckoning: wheel counters to a pose and to how uncertain it is.
 
 use crate::kinematics::Differential;
-use libm::{cos, fabs, sin};
+use libm::{fabs, sincos};
 use types::Pose;
 use types::geometry::TAU;
 
@@ -122,7 +122,7 @@ impl Odometer {
 
     fn spread(&mut self, step: Increment, left: f64, right: f64) {
         let middle = self.pose.heading + step.turn / 2.0;
-        let (s, c) = (sin(middle), cos(middle));
+        let (s, c) = sincos(middle);
         let f = [[1.0, 0.0, -step.distance * s], [0.0, 1.0, step.distance * c], [0.0, 0.0, 1.0]];
         let b = self.parameters.drive.track;
         let bend = step.distance / (2.0 * b);
@@ -153,6 +153,7 @@ impl Odometer {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use libm::{cos, sin};
     use types::geometry::PI;
 
     /// 1000 counts a metre on both sides.
