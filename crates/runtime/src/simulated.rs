@@ -220,9 +220,10 @@ impl Player {
                 if self.blocked[at] > self.now || self.cores[at].is_idle(self.now) {
                     continue;
                 }
-                let mut core = &mut self.cores[at];
-                core.look_at_door(&self.context, self.now);
-                while let Some(job) = core.next(self.now) {
+                loop {
+                    let core = &mut self.cores[at];
+                    core.look_at_door(&self.context, self.now);
+                    let Some(job) = core.next(self.now) else { break };
                     // SAFETY: the core lives in this thread's own array, and nobody else takes it.
                     let ended = unsafe { Core::run(core, &self.context, job, self.now, None, || true) };
                     steps += 1;
@@ -237,8 +238,9 @@ impl Player {
                     if self.order[..place].iter().any(|higher| self.cores[*higher].door.is_rung()) {
                         continue 'again;
                     }
-                    core = &mut self.cores[at];
-                    core.look_at_door(&self.context, self.now);
+                    if self.cores[at].is_idle(self.now) {
+                        break;
+                    }
                 }
             }
             return Ok(());
