@@ -151,10 +151,15 @@ impl Converter {
     /// Fills the tables: about 260 kB and some milliseconds, once.
     pub fn new() -> Converter {
         let mut table = Box::new([0; SIDE * SIDE]);
+        let mut set = |red_green: i32, red_blue: i32, hue: f64| {
+            table[hue_index(red_green, red_blue) as usize % (SIDE * SIDE)] = step_of_hue(hue);
+        };
         for red_green in -255i32..=255 {
-            for red_blue in -255i32..=255 {
+            // Green is not below blue here; with the two exchanged the hue is mirrored. No two bytes differ by more than 255.
+            for red_blue in red_green..=(red_green + 255).min(255) {
                 let exact = hue(f64::from(red_green), f64::from(red_blue));
-                table[hue_index(red_green, red_blue) as usize % (SIDE * SIDE)] = step_of_hue(exact);
+                set(red_green, red_blue, exact);
+                set(red_blue, red_green, TAU - exact);
             }
         }
         Converter { hue: table }
