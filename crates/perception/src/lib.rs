@@ -23,6 +23,7 @@ pub mod local_map;
 pub mod motion;
 pub mod picture;
 pub mod sonar;
+mod lead;
 mod split;
 pub mod target;
 

@@ -1,7 +1,8 @@
 //! The split of an RGB picture by colour, without its conversion.
 //!
-//! In plain words: who only wants to know which pixels are red need not know the hue of the others. Most of a picture is not
-//! coloured enough or too dark, which two comparisons tell; only for the rest the hue is looked up.
+//! In plain words: who only wants to know which pixels are red need not know the hue of the others. In what is red, red exceeds
+//! green and blue by so much, which the bytes tell as they lie; most of a picture shows nothing of that. Of what is left most is
+//! not coloured enough or too dark, which two comparisons tell; only for the rest the hue is looked up.
 //!
 //! With s and i the least steps of saturation and intensity, and with the rounding of [`Converter::convert`], in whole numbers
 //!
@@ -10,12 +11,8 @@
 //! ```
 
 use crate::colour::{ColourRange, Converter, SET, Steps, load};
+use crate::lead::{GROUP, Lead};
 use crate::picture::{WrongLength, check};
-
-/// Pixels that are compared at a time: what lies between the loops stays in the nearest cache.
-const BLOCK: usize = 256;
-/// Pixels whose hues are looked up or passed over together.
-const GROUP: usize = 16;
 
 impl Converter {
     /// Sets each pixel of `mask` to [`SET`] where the RGB picture `rgb` lies in `range`, and to 0 elsewhere.
@@ -24,16 +21,13 @@ impl Converter {
     /// the last pixel. `rgb` has three bytes for each byte of `mask`.
     pub fn split(&self, rgb: &[u8], range: &ColourRange, mask: &mut [u8]) -> Result<(), WrongLength> {
         check("rgb", rgb.len(), 3 * mask.len())?;
-        let bounds = Bounds::of(Steps::of(range));
-        let (mut pixels, mut vivid) = ([0; BLOCK], [0; BLOCK]);
-        let (blocks, rest) = rgb.as_chunks::<3>().0.as_chunks::<BLOCK>();
-        let (mask_blocks, mask_rest) = mask.as_chunks_mut::<BLOCK>();
-        for (from, out) in blocks.iter().zip(mask_blocks) {
-            load(from, &mut pixels);
-            for (vivid, pixel) in vivid.iter_mut().zip(&pixels) {
-                *vivid = bounds.is_vivid(*pixel);
-            }
-            self.look_up(&pixels, &vivid, bounds.hues, out);
+        let steps = Steps::of(range);
+        let (bounds, lead) = (Bounds::of(steps), Lead::of(steps));
+        let (groups, rest) = rgb.as_chunks::<3>().0.as_chunks::<GROUP>();
+        let (mask_groups, mask_rest) = mask.as_chunks_mut::<GROUP>();
+        for (number, (from, out)) in groups.iter().zip(mask_groups).enumerate() {
+            let passed_over = lead.as_ref().is_some_and(|lead| lead.is_missing(rgb, number));
+            *out = if passed_over { [0; GROUP] } else { self.split_group(from, bounds) };
         }
         for ([r, g, b], out) in rest.iter().zip(mask_rest) {
             let pixel = u32::from_le_bytes([*r, *g, *b, 0]);
@@ -42,19 +36,20 @@ impl Converter {
         Ok(())
     }
 
-    /// The mask of a block of pixels of which it is known whether they are vivid.
-    #[inline(always)]
-    fn look_up(&self, pixels: &[u32; BLOCK], vivid: &[u32; BLOCK], hues: (u8, u8), mask: &mut [u8; BLOCK]) {
-        let groups = pixels.as_chunks::<GROUP>().0.iter().zip(vivid.as_chunks::<GROUP>().0);
-        for ((pixels, vivid), out) in groups.zip(mask.as_chunks_mut::<GROUP>().0) {
-            if vivid.iter().fold(0, |any, vivid| any | vivid) == 0 {
-                *out = [0; GROUP];
-                continue;
-            }
-            for ((pixel, vivid), out) in pixels.iter().zip(vivid).zip(out) {
-                *out = self.decide(*pixel, *vivid, hues);
+    fn split_group(&self, rgb: &[[u8; 3]; GROUP], bounds: Bounds) -> [u8; GROUP] {
+        let (mut pixels, mut vivid, mut mask) = ([0; GROUP], [0; GROUP], [0; GROUP]);
+        load(rgb, &mut pixels);
+        let mut any = 0;
+        for (vivid, pixel) in vivid.iter_mut().zip(&pixels) {
+            *vivid = bounds.is_vivid(*pixel);
+            any |= *vivid;
+        }
+        if any != 0 {
+            for ((pixel, vivid), out) in pixels.iter().zip(&vivid).zip(&mut mask) {
+                *out = self.decide(*pixel, *vivid, bounds.hues);
             }
         }
+        mask
     }
 
     #[inline(always)]
@@ -91,11 +86,13 @@ impl Bounds {
     /// Whether a pixel is coloured and bright enough: not 0 when it is. The bytes of `pixel` are R G B x.
     #[inline(always)]
     fn is_vivid(self, pixel: u32) -> u32 {
-        let channel = |shift: u32| ((pixel >> shift) & 0xff) as i32;
+        let channel = |shift: u32| ((pixel >> shift) & 0xff) as i32 as f32;
         let (r, g, b) = (channel(0), channel(8), channel(16));
-        let (sum, least) = ((r + g + b) as f32, (1530 * r.min(g).min(b)) as f32);
+        // Of numbers every processor finds the lesser at once, as long as nobody asks what becomes of those that are none.
+        let lesser = |a: f32, b: f32| if a < b { a } else { b };
+        let (sum, least) = (r + g + b, lesser(lesser(r, g), b));
         // All are whole numbers below 2²⁴, so nothing is rounded. A difference has its sign bit set when a bound is missed.
-        let misses = (sum * self.paleness - least).to_bits() | (sum - self.sum).to_bits();
+        let misses = (sum * self.paleness - 1530.0 * least).to_bits() | (sum - self.sum).to_bits();
         !misses & (1 << 31)
     }
 }
@@ -129,6 +126,9 @@ mod tests {
             ColourRange::default(),
             ColourRange { saturation_min: 0.0, intensity_min: 0.0, ..ColourRange::default() },
             ColourRange { hue_from: 1.0, hue_to: 3.0, saturation_min: 1.0, intensity_min: 0.3 },
+            ColourRange { hue_from: 1.8, hue_to: 2.5, ..ColourRange::default() },
+            ColourRange { hue_from: 4.0, hue_to: 4.1, saturation_min: 0.02, intensity_min: 0.05 },
+            ColourRange { hue_from: 3.3, hue_to: 5.1, saturation_min: 0.1, ..ColourRange::default() },
             ColourRange { intensity_min: 1.0, ..grey_too },
             grey_too,
         ];
