@@ -6,7 +6,6 @@
 
 #![allow(unsafe_code)]
 
-use core::sync::atomic::{AtomicU32, AtomicU64, Ordering, compiler_fence};
 use std::any::Any;
 use std::cmp::Reverse;
 use std::collections::BinaryHeap;
@@ -22,7 +21,9 @@ use crate::door::{CHANGES, Door};
 use crate::os;
 use crate::port::{Envelope, InputEnd, OutputEnd, WireId};
 use crate::processor::{Checks, Reading, Stopwatch, agrees};
+use crate::ring::{self, ring};
 use crate::stats::{AgentStats, bump, bump_by, nanos};
+use crate::sync::{AtomicU32, AtomicU64, Ordering, light_barrier, named};
 
 /// When an agent runs.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -187,18 +188,55 @@ pub(crate) enum Answer {
 /// What the watchdog sees of an executor: which agent is in a step, and since when.
 #[derive(Debug, Default)]
 pub(crate) struct Running {
-    /// The slot plus one; zero between steps.
-    pub slot: AtomicU32,
+    /// How many steps there were, and in the lower half the slot of the agent that is in one, plus one; zero there between steps.
+    step: AtomicU64,
     /// The number of the agent.
     pub agent: AtomicU32,
     /// When the step began, in [`os::ticks`].
     pub since: AtomicU64,
     /// After how long it is taken for one that does not return (ns).
     pub limit: AtomicU64,
-    /// Counts steps, so that two of the same agent are told apart.
-    pub steps: AtomicU64,
     /// How often the executor itself took or freed memory, between and around the steps of its agents.
-    pub allocations: AtomicU64,
+    pub allocations: core::sync::atomic::AtomicU64,
+}
+
+/// A step of an agent: no other one is equal.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) struct InStep(u64);
+
+impl InStep {
+    /// Whose step it is.
+    pub(crate) fn slot(self) -> u32 {
+        self.0 as u32 - 1
+    }
+}
+
+impl Running {
+    /// A step begins. Only the thread that has the core may say so.
+    #[inline]
+    pub(crate) fn begin(&self, slot: u32) {
+        let count = (self.step.load(Ordering::Relaxed) >> 32) + 1;
+        // Release: who gives this step up has seen what was done before it. Pairs with the barrier in `Owner::take_from`.
+        let ordering = named("hand-over: step begins", Ordering::Release);
+        self.step.store(count << 32 | u64::from(slot + 1), ordering);
+    }
+
+    /// It ended.
+    #[inline]
+    pub(crate) fn end(&self) {
+        self.step.store(self.step.load(Ordering::Relaxed) >> 32 << 32, Ordering::Relaxed);
+    }
+
+    /// The step that is going on. Says nothing of what was done before it: who needs that makes a barrier.
+    pub(crate) fn in_step(&self) -> Option<InStep> {
+        let word = self.step.load(Ordering::Relaxed);
+        (word as u32 != 0).then_some(InStep(word))
+    }
+
+    /// Whether it is still going on.
+    pub(crate) fn is_still_in(&self, step: InStep) -> bool {
+        self.step.load(Ordering::Relaxed) == step.0
+    }
 }
 
 /// The time of a step.
@@ -233,8 +271,8 @@ pub(crate) struct Core {
     cursor: u32,
     pub door: Arc<Door>,
     pub running: Arc<Running>,
-    changes: rtrb::Consumer<Change>,
-    answers: rtrb::Producer<Answer>,
+    changes: ring::Receiver<Option<Change>>,
+    answers: ring::Sender<Option<Answer>>,
     nanos_per_tick: f64,
     checks: Checks,
     /// How many stalls the witness had seen after the last step.
@@ -243,10 +281,26 @@ pub(crate) struct Core {
 
 /// The control side's ends of an executor.
 pub(crate) struct Link {
-    pub changes: rtrb::Producer<Change>,
-    pub answers: rtrb::Consumer<Answer>,
+    changes: ring::Sender<Option<Change>>,
+    answers: ring::Receiver<Option<Answer>>,
     pub door: Arc<Door>,
     pub running: Arc<Running>,
+}
+
+impl Link {
+    /// Gives a change to the executor, unless too many are under way.
+    pub(crate) fn change(&mut self, change: Change) -> bool {
+        let has_room = self.changes.has_room();
+        if has_room {
+            self.changes.push(|slot| *slot = Some(change));
+        }
+        has_room
+    }
+
+    /// The next answer.
+    pub(crate) fn answer(&mut self) -> Option<Answer> {
+        if self.answers.advance() { self.answers.current_mut().take() } else { None }
+    }
 }
 
 /// How many changes or answers can be under way.
@@ -266,8 +320,8 @@ pub(crate) enum Ended {
 
 impl Core {
     pub(crate) fn new(number: u32) -> (Core, Link) {
-        let (change_in, changes) = rtrb::RingBuffer::new(UNDER_WAY);
-        let (answers, answer_out) = rtrb::RingBuffer::new(UNDER_WAY);
+        let (change_in, changes) = ring(UNDER_WAY, false);
+        let (answers, answer_out) = ring(UNDER_WAY, false);
         let door = Arc::new(Door::new());
         let running = Arc::new(Running::default());
         let core = Core {
@@ -460,9 +514,8 @@ impl Core {
             let begun = read();
             core.running.limit.store(seat_limit.0 as u64, Ordering::Relaxed);
             core.running.since.store(begun.ticks, Ordering::Relaxed);
-            core.running.steps.store(core.running.steps.load(Ordering::Relaxed) + 1, Ordering::Relaxed);
             core.running.agent.store(seat_id.0, Ordering::Relaxed);
-            core.running.slot.store(job.slot + 1, Ordering::Relaxed);
+            core.running.begin(job.slot);
             (body, step, checked, begun)
         };
         let (first, panics, taken) = {
@@ -499,8 +552,8 @@ impl Core {
         let ended = read();
         // First the step is published as ended, then it is asked whose the core is: the watchdog does it the other way round,
         // with a barrier on all processors between, so that one of the two sees the other.
-        running.slot.store(0, Ordering::Release);
-        compiler_fence(Ordering::SeqCst);
+        running.end();
+        light_barrier();
         if !still_mine() {
             // The watchdog gave the agent up; what it left behind is freed here, on a thread that has lost its priority.
             return None;
@@ -575,11 +628,8 @@ impl Core {
             }
         };
         if let Some(cause) = cause {
-            let died = Answer::Died { slot: job.slot, id: seat.id, time: end, cause, body: body.take() };
-            // There is room: one agent dies once before the control side has taken the news and given it a successor.
-            if let Err(rtrb::PushError::Full(lost)) = self.answers.push(died) {
-                std::mem::forget(lost);
-            }
+            let id = seat.id;
+            self.answer(Answer::Died { slot: job.slot, id, time: end, cause, body: body.take() });
             return;
         }
         seat.body = body;
@@ -602,25 +652,31 @@ impl Core {
         bump(&seat.stats.hangs);
         let died =
             Answer::Died { slot, id: seat.id, time: now, cause: RawCause::Hang, body: seat.body.take() };
-        if let Err(rtrb::PushError::Full(lost)) = self.answers.push(died) {
-            std::mem::forget(lost);
+        self.answer(died);
+    }
+
+    /// Tells the control side. There is room: changes are served only while there is, and one agent dies once before the
+    /// control side has taken the news and given it a successor.
+    fn answer(&mut self, answer: Answer) {
+        if self.answers.has_room() {
+            self.answers.push(|slot| *slot = Some(answer));
+        } else {
+            // Memory is not freed on this side.
+            std::mem::forget(answer);
         }
     }
 
     /// Commits the changes that wait. Each goes back to the control side, to be freed there.
     pub(crate) fn serve_changes(&mut self, context: &Context, now: Time) {
-        while !self.answers.is_full() {
-            let Ok(mut change) = self.changes.pop() else { return };
+        while self.answers.has_room() && self.changes.advance() {
+            let Some(mut change) = self.changes.current_mut().take() else { return };
             let before = allocations::so_far();
             let done = self.commit(&mut change, context, now);
             // An agent that is stopped may free what it likes.
             if !matches!(change, Change::Stop | Change::Unseat { .. }) {
                 self.note_allocations(allocations::so_far() - before);
             }
-            let answer = if done { Answer::Done(change) } else { Answer::NotDrained(change) };
-            if let Err(rtrb::PushError::Full(lost)) = self.answers.push(answer) {
-                std::mem::forget(lost);
-            }
+            self.answer(if done { Answer::Done(change) } else { Answer::NotDrained(change) });
         }
     }
 

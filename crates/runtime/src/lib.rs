@@ -57,6 +57,7 @@ mod context;
 mod door;
 mod executor;
 mod folder;
+mod handover;
 mod log;
 mod memory;
 mod message_type;

@@ -13,7 +13,7 @@
 
 use std::sync::Arc;
 
-use crate::sync::{AtomicU64, Ordering, UnsafeCell};
+use crate::sync::{AtomicU64, Ordering, UnsafeCell, named};
 use types::{Header, Message, Time};
 
 /// Pins are counted in the low bits of a slot's state, the sequence stands above them.
@@ -144,7 +144,12 @@ impl<T: Message> Writer<T> {
             let free = seen == UNREADABLE
                 || (seen & PINS == 0
                     && state
-                        .compare_exchange(seen, UNREADABLE, Ordering::Acquire, Ordering::Relaxed)
+                        .compare_exchange(
+                            seen,
+                            UNREADABLE,
+                            named("memory: take back", Ordering::Acquire),
+                            Ordering::Relaxed,
+                        )
                         .is_ok());
             if free {
                 return Some(Loan { writer: self, slot, done: false });
@@ -178,11 +183,13 @@ impl<T: Message> Loan<'_, T> {
             content.len = len.min(content.row.len());
         });
         // Pairs with the acquire in `Shared::pin`: who pins this sequence sees the content.
-        writer.shared.slots[slot as usize].state.store(sequence << SEQUENCE_SHIFT, Ordering::Release);
+        writer.shared.slots[slot as usize]
+            .state
+            .store(sequence << SEQUENCE_SHIFT, named("memory: publish", Ordering::Release));
         let place = (sequence % writer.shared.recent.len() as u64) as usize;
-        // Pairs with the acquire in `Shared::recent`.
-        writer.shared.recent[place].store(sequence << 24 | u64::from(slot), Ordering::Release);
-        writer.shared.published.store(writer.next, Ordering::Release);
+        writer.shared.recent[place].store(sequence << 24 | u64::from(slot), Ordering::Relaxed);
+        // Pairs with the acquire in `Seat::at`: who sees the number finds the link.
+        writer.shared.published.store(writer.next, named("memory: publish count", Ordering::Release));
         writer.history.push_back(slot);
         if writer.history.len() > writer.shared.recent.len()
             && let Some(old) = writer.history.pop_front()
@@ -212,7 +219,12 @@ impl<T: Message> Shared<T> {
                 return false;
             }
             // Acquire pairs with the release in `Loan::publish`; a writer that takes the slot makes the exchange fail.
-            match state.compare_exchange(seen, seen + 1, Ordering::Acquire, Ordering::Relaxed) {
+            match state.compare_exchange(
+                seen,
+                seen + 1,
+                named("memory: pin", Ordering::Acquire),
+                Ordering::Relaxed,
+            ) {
                 Ok(_) => return true,
                 Err(now) => seen = now,
             }
@@ -221,14 +233,14 @@ impl<T: Message> Shared<T> {
 
     fn unpin(&self, slot: u32) {
         // Pairs with the acquire in `Writer::loan`.
-        self.slots[slot as usize].state.fetch_sub(1, Ordering::Release);
+        self.slots[slot as usize].state.fetch_sub(1, named("memory: unpin", Ordering::Release));
     }
 
     /// The link to the message with this sequence, if it is still in the history.
     fn recent(&self, sequence: u64) -> Option<Link> {
         let place = (sequence % self.recent.len() as u64) as usize;
-        // Pairs with the release in `Loan::publish`.
-        let seen = self.recent[place].load(Ordering::Acquire);
+        // Who pins what it leads to sees the content.
+        let seen = self.recent[place].load(Ordering::Relaxed);
         (seen != UNREADABLE && seen >> 24 == sequence & (u64::MAX >> 24))
             .then_some(Link { sequence, slot: (seen & 0xff_ffff) as u32 })
     }
@@ -276,8 +288,8 @@ impl<T: Message> Seat<T> {
 
     /// The value at a time: between two messages or beyond the last where the type says how, else the nearest message.
     pub(crate) fn at(&self, time: Time) -> Option<Found<T>> {
-        // Pairs with the release in `Loan::publish`.
-        let end = self.shared.published.load(Ordering::Acquire);
+        // Pairs with the release in `Loan::publish`: what was counted is found.
+        let end = self.shared.published.load(named("memory: find count", Ordering::Acquire));
         let mut later: Option<(T, Time)> = None;
         let mut sequence = end;
         while sequence > end.saturating_sub(self.shared.recent.len() as u64) {
@@ -416,36 +428,78 @@ mod tests {
 #[cfg(loom)]
 mod model {
     use super::*;
+    use crate::sync::weaken;
     use loom::thread;
     use types::messages::Twist;
 
+    fn write(writer: &mut Writer<Twist>, i: i64) {
+        let mut loan = writer.loan().expect("a slot for every loan");
+        *loan.parts().0 = Twist::new(i as f64, i as f64);
+        loan.publish(Header { stamp: Time(i), ..Header::default() }, 0);
+    }
+
+    fn read(pin: &Pin<'_, Twist>, sequence: u64) {
+        let (twist, stamp) = (*pin.head(), pin.header().stamp);
+        assert_eq!(twist.linear, twist.angular, "torn");
+        assert_eq!(twist.linear, stamp.0 as f64, "another's content");
+        assert_eq!(stamp.0 as u64, sequence + 1, "another message than the link meant");
+    }
+
+    /// Two readers pin while the writer goes around all four slots.
     #[test]
     fn a_pinned_slot_is_never_written() {
-        loom::model(|| {
+        let elsewhere = ["memory: pin", "memory: publish", "memory: publish count"];
+        weaken::check(&elsewhere, || {
+            let mut writer = memory::<Twist>(Form { history: 1, seats: 1, rows: 0 });
+            write(&mut writer, 1);
+            let link = writer.shared.recent(0).expect("it was published");
+            // Half a seat for each.
+            let readers = [(); 2].map(|()| {
+                let seat = Seat::new(writer.shared());
+                thread::spawn(move || seat.pin(link).inspect(|pin| read(pin, 0)).is_some())
+            });
+            (2..=5).for_each(|i| write(&mut writer, i));
+            readers.into_iter().for_each(|reader| assert!(reader.join().is_ok()));
+        });
+    }
+
+    /// A reader follows links to messages that come while it reads.
+    #[test]
+    fn a_link_leads_to_its_message_or_nowhere() {
+        let elsewhere = ["memory: publish count", "memory: unpin", "memory: take back"];
+        weaken::check(&elsewhere, || {
             let mut writer = memory::<Twist>(Form { history: 1, seats: 1, rows: 0 });
             let seat = Seat::new(writer.shared());
-            let write = |writer: &mut Writer<Twist>, i: i64| {
-                if let Some(mut loan) = writer.loan() {
-                    *loan.parts().0 = Twist::new(i as f64, i as f64);
-                    loan.publish(Header { stamp: Time(i), ..Header::default() }, 0);
-                }
-            };
-            write(&mut writer, 1);
             let reader = thread::spawn(move || {
                 for sequence in 0..2 {
                     if let Some(link) = seat.shared.recent(sequence)
                         && let Some(pin) = seat.pin(link)
                     {
-                        let (twist, stamp) = (*pin.head(), pin.header().stamp);
-                        assert_eq!(twist.linear, twist.angular, "torn");
-                        assert_eq!(twist.linear, stamp.0 as f64, "another's content");
-                        assert_eq!(stamp.0 as u64, sequence + 1, "another message than the link meant");
+                        read(&pin, sequence);
                     }
                 }
             });
-            for i in 2..=4 {
-                write(&mut writer, i);
-            }
+            (1..=3).for_each(|i| write(&mut writer, i));
+            reader.join().unwrap();
+        });
+    }
+
+    /// A look-up by time finds what was published last, or what stood there before it.
+    #[test]
+    fn a_look_up_finds_a_whole_message_while_another_is_written() {
+        let elsewhere = ["memory: unpin", "memory: take back", "memory: pin", "memory: publish"];
+        weaken::check(&elsewhere, || {
+            let mut writer = memory::<Twist>(Form { history: 2, seats: 1, rows: 0 });
+            let seat = Seat::new(writer.shared());
+            write(&mut writer, 1);
+            let reader = thread::spawn(move || {
+                let Some(Found::Nearest(twist, stamp)) = seat.at(Time(3)) else {
+                    panic!("nothing was found");
+                };
+                assert_eq!(twist.linear, twist.angular, "torn");
+                assert_eq!(twist.linear, stamp.0 as f64, "another's content");
+            });
+            write(&mut writer, 2);
             reader.join().unwrap();
         });
     }

@@ -2,10 +2,12 @@
 
 #![allow(unsafe_code)]
 
+#[cfg(not(loom))]
 use core::sync::atomic::AtomicU32;
 use std::io;
 
 /// Waits while `word` is `expected`, until it is woken or `until` (monotonic clock, nanoseconds) has come.
+#[cfg(not(loom))]
 pub(crate) fn futex_wait(word: &AtomicU32, expected: u32, until: Option<i64>) {
     let timeout = until.map(|nanos| libc::timespec {
         tv_sec: nanos.div_euclid(1_000_000_000),
@@ -28,6 +30,7 @@ pub(crate) fn futex_wait(word: &AtomicU32, expected: u32, until: Option<i64>) {
 }
 
 /// Wakes the thread that waits on `word`.
+#[cfg(not(loom))]
 pub(crate) fn futex_wake(word: &AtomicU32) {
     // SAFETY: `word` is a valid address; waking touches nothing else.
     unsafe {
@@ -153,6 +156,7 @@ pub(crate) fn register_barrier() {
 }
 
 /// A full memory barrier on every processor that runs a thread of this process.
+#[cfg(not(loom))]
 pub(crate) fn barrier_everywhere() {
     // SAFETY: the command takes no pointers.
     unsafe { libc::syscall(libc::SYS_membarrier, libc::MEMBARRIER_CMD_PRIVATE_EXPEDITED, 0, 0) };

@@ -19,7 +19,7 @@
 
 use std::sync::Arc;
 
-use crate::sync::{AtomicU64, Ordering, UnsafeCell};
+use crate::sync::{AtomicU64, Ordering, UnsafeCell, named};
 
 /// What a sender does when the ring is full.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -120,8 +120,8 @@ impl<T> Sender<T> {
     /// Whether a message can be sent without displacing another.
     #[inline]
     pub(crate) fn has_room(&self) -> bool {
-        // Pairs with the release in `Receiver::advance`: the receiver is done with the slot that the entry names.
-        self.shared.entries[self.index].load(Ordering::Acquire) & FULL == 0
+        // Whether the receiver is done with the slot that the entry names is seen by `push`.
+        self.shared.entries[self.index].load(Ordering::Relaxed) & FULL == 0
     }
 
     /// Fills the next message in place and sends it. Where there is no room it displaces the oldest if the ring allows that,
@@ -134,20 +134,21 @@ impl<T> Sender<T> {
             self.shared.slots[usize::from(self.slot)].with_mut(|place| fill(unsafe { &mut *place }));
             // Release pairs with the acquire in `Receiver::advance`, for what was filled; acquire pairs with its release,
             // for the slot that comes back.
-            let old = entry.swap(full(self.slot, self.position), Ordering::AcqRel);
+            let ordering = named("ring: displace", Ordering::AcqRel);
+            let old = entry.swap(full(self.slot, self.position), ordering);
             self.slot = slot_of(old);
             self.step();
             if old & FULL == 0 { Pushed::Stored } else { Pushed::Displaced }
         } else {
             // Pairs with the release in `Receiver::advance`.
-            let old = entry.load(Ordering::Acquire);
+            let old = entry.load(named("ring: refuse, look", Ordering::Acquire));
             if old & FULL != 0 {
                 return Pushed::Full;
             }
             // SAFETY: `self.slot` is this end's own.
             self.shared.slots[usize::from(self.slot)].with_mut(|place| fill(unsafe { &mut *place }));
             // Pairs with the acquire in `Receiver::advance`. An empty entry is the sender's to change.
-            entry.store(full(self.slot, self.position), Ordering::Release);
+            entry.store(full(self.slot, self.position), named("ring: refuse, put", Ordering::Release));
             self.slot = slot_of(old);
             self.step();
             Pushed::Stored
@@ -173,7 +174,7 @@ impl<T> Receiver<T> {
         loop {
             let entry = &self.shared.entries[self.index];
             // Pairs with the release in `Sender::push`.
-            let seen = entry.load(Ordering::Acquire);
+            let seen = entry.load(named("ring: take", Ordering::Acquire));
             if seen & FULL == 0 {
                 return false;
             }
@@ -185,15 +186,13 @@ impl<T> Receiver<T> {
             }
             if self.displaces {
                 // Release pairs with the acquire in `Sender::push`: this end has done reading the slot that it gives back.
-                if entry
-                    .compare_exchange(seen, empty(self.slot), Ordering::AcqRel, Ordering::Relaxed)
-                    .is_err()
-                {
+                let ordering = named("ring: displaceable, give back", Ordering::Release);
+                if entry.compare_exchange(seen, empty(self.slot), ordering, Ordering::Relaxed).is_err() {
                     continue;
                 }
             } else {
                 // A full entry is the receiver's to change where the sender never displaces.
-                entry.store(empty(self.slot), Ordering::Release);
+                entry.store(empty(self.slot), named("ring: refuse, give back", Ordering::Release));
             }
             self.slot = slot_of(seen);
             self.seek(self.position + 1);
@@ -206,6 +205,13 @@ impl<T> Receiver<T> {
     pub(crate) fn current(&self) -> &T {
         // SAFETY: `self.slot` is this end's own until the next `advance`, which needs it exclusively.
         self.shared.slots[usize::from(self.slot)].with(|place| unsafe { &*place })
+    }
+
+    /// The same, to be changed or taken out: nobody else sees it.
+    #[inline]
+    pub(crate) fn current_mut(&mut self) -> &mut T {
+        // SAFETY: as in `current`, and this end is borrowed exclusively.
+        self.shared.slots[usize::from(self.slot)].with_mut(|place| unsafe { &mut *place })
     }
 
     fn seek(&mut self, position: u64) {
@@ -280,66 +286,96 @@ mod tests {
 #[cfg(loom)]
 mod model {
     use super::*;
+    use crate::sync::weaken;
     use loom::thread;
 
     /// Both halves of a payload are written apart: a torn read would show them apart.
     #[derive(Default)]
     struct Pair(u32, u32);
 
-    fn run(capacity: usize, displaces: bool, sends: u32) {
-        loom::model(move || {
-            let (mut sender, mut receiver) = ring::<Pair>(capacity, displaces);
-            let other = thread::spawn(move || {
-                let mut stored = 0;
-                for i in 1..=sends {
-                    let pushed = sender.push(|pair| {
-                        pair.0 = i;
-                        pair.1 = i;
-                    });
-                    stored += u32::from(pushed != Pushed::Full);
-                }
-                stored
-            });
-            let mut last = 0;
-            let mut taken = 0;
-            for _ in 0..2 {
-                if receiver.advance() {
-                    let pair = receiver.current();
-                    assert_eq!(pair.0, pair.1, "torn");
-                    assert!(pair.0 > last, "out of order or doubled: {} after {last}", pair.0);
-                    last = pair.0;
-                    taken += 1;
-                }
-            }
-            let stored = other.join().unwrap();
-            while receiver.advance() {
+    /// A sender and a receiver at once, with a ring that was full before: so the slots go around within few messages.
+    fn exchange(capacity: u32, displaces: bool, sends: u32, takes: u32) {
+        let (mut sender, mut receiver) = ring::<Pair>(capacity as usize, displaces);
+        let send = |sender: &mut Sender<Pair>, i: u32| sender.push(|pair| *pair = Pair(i, i));
+        (1..=capacity).for_each(|i| assert_eq!(send(&mut sender, i), Pushed::Stored));
+        let other = thread::spawn(move || {
+            let became = (capacity + 1..=capacity + sends).map(|i| send(&mut sender, i));
+            became.filter(|pushed| *pushed != Pushed::Full).count() as u32
+        });
+        let (mut last, mut taken) = (0, 0);
+        let mut take = |receiver: &mut Receiver<Pair>| {
+            let some = receiver.advance();
+            if some {
                 let pair = receiver.current();
                 assert_eq!(pair.0, pair.1, "torn");
-                assert!(pair.0 > last, "out of order or doubled");
+                assert!(pair.0 > last, "out of order or doubled: {} after {last}", pair.0);
                 last = pair.0;
                 taken += 1;
             }
-            assert!(taken <= stored);
-            if displaces {
-                assert_eq!(last, sends, "the newest is never lost");
-            } else {
-                assert_eq!(taken, stored, "what was accepted arrives");
-            }
-        });
+            some
+        };
+        for _ in 0..takes {
+            take(&mut receiver);
+        }
+        let stored = capacity + other.join().unwrap();
+        while take(&mut receiver) {}
+        assert!(taken <= stored);
+        if displaces {
+            assert_eq!(last, capacity + sends, "the newest is never lost");
+        } else {
+            assert_eq!(taken, stored, "what was accepted arrives");
+        }
     }
 
     #[test]
     fn newest_wins_with_one_place() {
-        run(1, true, 3);
+        weaken::check(&[], || exchange(1, true, 3, 2));
     }
 
     #[test]
     fn newest_wins_past_the_wrap() {
-        run(2, true, 4);
+        weaken::check(&[], || exchange(2, true, 3, 2));
     }
 
     #[test]
     fn refuse_past_the_wrap() {
-        run(2, false, 4);
+        weaken::check(&[], || exchange(2, false, 3, 3));
+    }
+
+    /// What is asked goes one way and comes back the other, to be freed where it was made.
+    #[test]
+    fn what_is_lent_comes_back() {
+        weaken::check(&["ring: refuse, look", "ring: refuse, give back"], || {
+            let (mut ask, mut asked) = ring::<Option<Box<Pair>>>(1, false);
+            let (mut answer, mut answered) = ring::<Option<Box<Pair>>>(1, false);
+            let other = thread::spawn(move || {
+                let mut done = 0;
+                while done < 2 {
+                    if answer.has_room() && asked.advance() {
+                        let mut pair = asked.current_mut().take().expect("an empty message");
+                        pair.1 = pair.0;
+                        answer.push(|slot| *slot = Some(pair));
+                        done += 1;
+                    } else {
+                        thread::yield_now();
+                    }
+                }
+            });
+            let (mut sent, mut back) = (0, 0);
+            while back < 2 {
+                if sent < 2 && ask.has_room() {
+                    sent += 1;
+                    ask.push(|slot| *slot = Some(Box::new(Pair(sent, 0))));
+                }
+                if answered.advance() {
+                    back += 1;
+                    let pair = answered.current_mut().take().expect("an empty answer");
+                    assert_eq!((pair.0, pair.1), (back, back));
+                } else {
+                    thread::yield_now();
+                }
+            }
+            other.join().unwrap();
+        });
     }
 }

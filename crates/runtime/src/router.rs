@@ -708,10 +708,12 @@ impl Router {
         let busy = || {
             Refusal::new("the executor does not answer").help("an agent in it does not return from its step")
         };
-        self.executors[executor].link.changes.push(change).map_err(|_| busy())?;
+        if !self.executors[executor].link.change(change) {
+            return Err(busy());
+        }
         loop {
             let go_on = fabric.pump(executor);
-            while let Ok(answer) = self.executors[executor].link.answers.pop() {
+            while let Some(answer) = self.executors[executor].link.answer() {
                 match answer {
                     Answer::Done(change) => {
                         fabric.answered();

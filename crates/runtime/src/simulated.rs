@@ -68,7 +68,7 @@ impl Simulation {
                 let _ = done.send(play(self));
             })
             .map_err(|error| CannotRun::NoThread(error.to_string()))?;
-        let mut watched: Option<(usize, u64)> = None;
+        let mut watched = None;
         let mut since = os::monotonic();
         loop {
             match ended.recv_timeout(HostDuration::from_millis(200)) {
@@ -82,12 +82,12 @@ impl Simulation {
                 }
                 Err(std::sync::mpsc::RecvTimeoutError::Timeout) => {}
             }
-            let in_step = running.iter().position(|running| running.slot.load(Ordering::Relaxed) != 0);
-            let seen = in_step.map(|at| (at, running[at].steps.load(Ordering::Relaxed)));
+            let in_step = |(at, running): (usize, &Arc<Running>)| running.in_step().map(|step| (at, step));
+            let seen = running.iter().enumerate().find_map(in_step);
             if seen != watched || seen.is_none() {
                 (watched, since) = (seen, os::monotonic());
             } else if os::monotonic() - since > HOST_LIMIT.0 {
-                let agent = in_step.map(|at| running[at].agent.load(Ordering::Relaxed)).unwrap_or(u32::MAX);
+                let agent = seen.map_or(u32::MAX, |(at, _)| running[at].agent.load(Ordering::Relaxed));
                 let agent = directory
                     .name(types::AgentId(agent))
                     .map_or("an agent".into(), |name| name.as_str().to_owned());

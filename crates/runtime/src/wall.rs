@@ -17,7 +17,8 @@ use types::{Duration, Time};
 use crate::agent::Registry;
 use crate::context::{Context, install_panic_hook};
 use crate::door::{CHANGES, Door};
-use crate::executor::{Core, Ended, Running};
+use crate::executor::{Core, Ended, InStep, Running};
+use crate::handover::Owner;
 use crate::log::LogThread;
 use crate::names::Directory;
 use crate::os;
@@ -25,6 +26,7 @@ use crate::plan::{ExecutorPlan, Plan};
 use crate::processor::{Processors, Stopwatch};
 use crate::request::{Refusal, Request};
 use crate::router::{Fabric, Incident, OutsideCall, Router};
+use crate::sync::Futex;
 use crate::system::{Ask, Built, CannotRun, Control, Options, Report, Verdict, asks, build};
 use crate::trace;
 use crate::witness::Witness;
@@ -66,34 +68,24 @@ impl WallClock {
 const NOBODY: u32 = 0;
 
 /// An executor's core and whose it is. A thread touches the core while `owner` is its own number.
-///
-/// ```text
-///            watchdog: the step of n lasts too long
-///   n ───────────────────────────────────────────────► n, marked
-///   ▲                                                   │    │
-///   └── n came back in time (n itself, or the watchdog) ┘    │ watchdog: n is still in that step
-///                                                            ▼
-///   m ◄──────────────── the spare thread m takes it ──────  FREE
-/// ```
 struct Cell {
     core: UnsafeCell<Core>,
-    /// The number of the thread that owns the core, perhaps marked, or [`FREE`].
-    owner: AtomicU32,
+    owner: Owner,
     /// The kernel's number of the owner's thread.
     thread: AtomicI32,
-    /// The slot that was given up, for the thread that takes over; plus one.
+    /// The slot that was given up, for the thread that takes over.
     given_up: AtomicU32,
     running: Arc<Running>,
     door: Arc<Door>,
     /// Where the spare thread waits to be called; it takes the call back when it has the core.
-    call: AtomicU32,
+    call: Futex,
     /// Whether the spare thread has been used up, and another is to be made.
     needs_spare: AtomicBool,
     granted: Mutex<Option<String>>,
     stop: AtomicBool,
 }
 
-// SAFETY: the core is touched only by the thread whose number `owner` holds; it changes only as `take_over` says.
+// SAFETY: the core is touched only by the thread whose number `owner` holds.
 unsafe impl Sync for Cell {}
 // SAFETY: everything in it can be sent; the core is only ever used by one thread at a time.
 unsafe impl Send for Cell {}
@@ -220,21 +212,20 @@ impl Runner {
             // Nobody is on it yet: its thread is made, but asks for no priority until somebody comes.
             self.router.executors[at].granted = "idle".into();
         }
+        self.next_thread += 1;
         let cell = Arc::new(Cell {
-            owner: AtomicU32::new(NOBODY),
+            owner: Owner::new(self.next_thread),
             thread: AtomicI32::new(0),
             given_up: AtomicU32::new(0),
             running: core.running.clone(),
             door: core.door.clone(),
-            call: AtomicU32::new(NOBODY),
+            call: Futex::new(NOBODY),
             needs_spare: AtomicBool::new(false),
             granted: Mutex::new(None),
             stop: AtomicBool::new(false),
             core: UnsafeCell::new(core),
         });
-        self.cells.push(cell.clone());
-        self.next_thread += 1;
-        cell.owner.store(self.next_thread, Ordering::Release);
+        self.cells.push(cell);
         self.spawn(at, self.next_thread)?;
         self.spawn_spare(at)
     }
@@ -412,8 +403,8 @@ impl Runner {
         self.router.stop_all(&mut fabric);
         for cell in &self.cells {
             cell.stop.store(true, Ordering::Release);
-            cell.call.store(STOPPED, Ordering::Release);
-            os::futex_wake(&cell.call);
+            cell.call.word.store(STOPPED, Ordering::Release);
+            cell.call.wake();
             cell.door.ring(CHANGES);
         }
         self.over.store(true, Ordering::Release);
@@ -421,7 +412,7 @@ impl Runner {
         let patience = os::monotonic() + PATIENCE.0;
         while self.threads.iter().any(|thread| !thread.is_finished()) && os::monotonic() < patience {
             for cell in &self.cells {
-                os::futex_wake(&cell.call);
+                cell.call.wake();
                 cell.door.ring(CHANGES);
             }
             std::thread::park_timeout(HostDuration::from_millis(1));
@@ -477,23 +468,21 @@ fn thread_main(
     let context = Context::new(log, directory);
     let _entered = context.enter();
     // A spare thread sleeps here until the core is its own.
-    while cell.owner.load(Ordering::Acquire) != number {
+    while !cell.owner.is(number) {
         if cell.stop.load(Ordering::Acquire) {
             return;
         }
-        if cell.call.load(Ordering::Acquire) == CALLED
-            && cell.owner.compare_exchange(FREE, number, Ordering::AcqRel, Ordering::Relaxed).is_ok()
-        {
+        if cell.call.word.load(Ordering::Acquire) == CALLED && cell.owner.claim(number) {
             let given_up = cell.given_up.load(Ordering::Acquire);
-            cell.call.store(NOBODY, Ordering::Release);
+            cell.call.word.store(NOBODY, Ordering::Release);
             cell.needs_spare.store(true, Ordering::Release);
-            // SAFETY: the exchange made the core this thread's own.
+            // SAFETY: the claim made the core this thread's own.
             let core = unsafe { &mut *cell.core.get() };
-            core.give_up(given_up - 1, clock.now());
+            core.give_up(given_up, clock.now());
             core.find_ready();
             break;
         }
-        os::futex_wait(&cell.call, cell.call.load(Ordering::Acquire) & !CALLED, None);
+        cell.call.wait(cell.call.word.load(Ordering::Acquire) & !CALLED, None);
     }
     cell.thread.store(os::thread_id(), Ordering::Release);
     *cell.granted.lock().unwrap_or_else(PoisonError::into_inner) = Some(granted);
@@ -549,7 +538,7 @@ fn run_core(
             core.next(now)
         };
         if let Some(job) = job {
-            let mine = || is_mine(cell, number);
+            let mine = || cell.owner.keeps(number);
             // SAFETY: the core is this thread's own; `mine` says whether it still is after the step.
             let ended = unsafe { Core::run(core, context, job, now, Some(watch), mine) };
             match ended {
@@ -586,31 +575,15 @@ fn run_core(
 /// the core is still this thread's.
 fn hang(cell: &Cell, number: u32, slot: u32) -> bool {
     cell.running.since.store(os::ticks(), Ordering::Relaxed);
-    cell.running.steps.store(cell.running.steps.load(Ordering::Relaxed) + 1, Ordering::Relaxed);
-    cell.running.slot.store(slot + 1, Ordering::Release);
-    let still = |owner: u32| owner == number || owner == number | MARK;
-    while still(cell.owner.load(Ordering::Acquire)) {
+    cell.running.begin(slot);
+    while cell.owner.is_still(number) {
         if cell.stop.load(Ordering::Acquire) {
-            cell.running.slot.store(0, Ordering::Relaxed);
-            return is_mine(cell, number);
+            cell.running.end();
+            return cell.owner.keeps(number);
         }
         core::hint::spin_loop();
     }
     false
-}
-
-/// Stands in `owner` beside the number of a thread that the watchdog is about to give up.
-const MARK: u32 = 1 << 31;
-/// Stands in `owner` when the core waits for the spare thread.
-const FREE: u32 = MARK - 1;
-
-/// After a step: whether the core is still this thread's own. The usual case costs one load; the watchdog's side makes the
-/// barrier that orders it behind what the step published.
-#[inline]
-fn is_mine(cell: &Cell, number: u32) -> bool {
-    cell.owner.load(Ordering::Acquire) == number
-        // The watchdog is about to give this thread up. Whoever makes the exchange first has the core.
-        || cell.owner.compare_exchange(number | MARK, number, Ordering::AcqRel, Ordering::Acquire).is_ok()
 }
 
 /// The watchdog: sees steps that last too long, gives their threads up, and hands what else they ran to the spare ones.
@@ -618,19 +591,16 @@ fn watch(cells: &[Arc<Cell>], over: &AtomicBool, hung: &AtomicU32) {
     os::exact_timers();
     // Without the right to a priority it watches all the same, later.
     let _ = os::set_fifo(WATCHDOG_PRIORITY);
-    let word = AtomicU32::new(0);
+    let word = Futex::new(0);
     let nanos_per_tick = os::nanos_per_tick();
     while !over.load(Ordering::Acquire) {
-        os::futex_wait(&word, 0, Some(os::monotonic() + WATCHDOG_PERIOD.0));
+        word.wait(0, Some(os::monotonic() + WATCHDOG_PERIOD.0));
         for cell in cells {
             let running = &cell.running;
-            let (slot, steps) = (running.slot.load(Ordering::Acquire), running.steps.load(Ordering::Acquire));
-            if slot == 0 {
-                continue;
-            }
+            let Some(step) = running.in_step() else { continue };
             let lasts =
                 os::ticks().saturating_sub(running.since.load(Ordering::Acquire)) as f64 * nanos_per_tick;
-            if lasts > running.limit.load(Ordering::Acquire) as f64 && take_over(cell, slot, steps) {
+            if lasts > running.limit.load(Ordering::Acquire) as f64 && take_over(cell, step) {
                 hung.fetch_add(1, Ordering::Relaxed);
             }
         }
@@ -638,30 +608,16 @@ fn watch(cells: &[Arc<Cell>], over: &AtomicBool, hung: &AtomicU32) {
 }
 
 /// Takes a core away from a thread that does not come back.
-fn take_over(cell: &Cell, slot: u32, steps: u64) -> bool {
-    let owner = cell.owner.load(Ordering::Acquire);
-    let no_spare = cell.call.load(Ordering::Acquire) != NOBODY || cell.needs_spare.load(Ordering::Acquire);
-    if owner >= FREE
-        || no_spare
-        || cell.owner.compare_exchange(owner, owner | MARK, Ordering::SeqCst, Ordering::Relaxed).is_err()
-    {
-        // It is on its way already, or no spare thread is there yet.
-        return false;
-    }
-    // After this, either the thread is still in the step and will see the mark, or it has left it and that is seen here.
-    os::barrier_everywhere();
-    let still_in = cell.running.slot.load(Ordering::SeqCst) == slot
-        && cell.running.steps.load(Ordering::SeqCst) == steps;
-    let next = if still_in { FREE } else { owner };
-    let done = cell.owner.compare_exchange(owner | MARK, next, Ordering::AcqRel, Ordering::Relaxed).is_ok();
-    if !still_in || !done {
-        // It came back and is at work.
+fn take_over(cell: &Cell, step: InStep) -> bool {
+    let no_spare =
+        cell.call.word.load(Ordering::Acquire) != NOBODY || cell.needs_spare.load(Ordering::Acquire);
+    if no_spare || !cell.owner.take_from(&cell.running, step) {
         return false;
     }
     // A failure leaves the thread where it is, at its priority; there is nothing else to be done about it.
     let _ = os::set_idle(cell.thread.load(Ordering::Acquire));
-    cell.given_up.store(slot, Ordering::Release);
-    cell.call.store(CALLED, Ordering::Release);
-    os::futex_wake(&cell.call);
+    cell.given_up.store(step.slot(), Ordering::Release);
+    cell.call.word.store(CALLED, Ordering::Release);
+    cell.call.wake();
     true
 }

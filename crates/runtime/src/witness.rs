@@ -1,11 +1,12 @@
 //! The witness: a bare thread on each processor, above everything, that only reads the clock. When it is late, nobody in the
 //! process is to blame.
 
-use core::sync::atomic::{AtomicBool, AtomicI64, AtomicU32, AtomicU64, Ordering};
+use core::sync::atomic::{AtomicBool, AtomicI64, AtomicU64, Ordering};
 
 use types::{Duration, Time};
 
 use crate::os;
+use crate::sync::Futex;
 
 /// Processors that are watched.
 const PROCESSORS: usize = 64;
@@ -39,10 +40,10 @@ impl Witness {
     /// clock to the run's.
     pub(crate) fn watch(&self, cpu: usize, over: &AtomicBool, offset: i64) {
         let Some(seen) = self.seen.get(cpu) else { return };
-        let word = AtomicU32::new(0);
+        let word = Futex::new(0);
         let mut due = os::monotonic() + PERIOD;
         while !over.load(Ordering::Acquire) {
-            os::futex_wait(&word, 0, Some(due));
+            word.wait(0, Some(due));
             let now = os::monotonic();
             if now - due > STALL {
                 seen.end.store(i64::MIN, Ordering::Release);

@@ -21,7 +21,7 @@ impl Router {
     /// Looks for deaths, and starts again who is due. Gives the time at which it wants to look again.
     pub(crate) fn supervise(&mut self, now: Time, fabric: &mut dyn Fabric) -> Time {
         for executor in 0..self.executors.len() {
-            while let Ok(answer) = self.executors[executor].link.answers.pop() {
+            while let Some(answer) = self.executors[executor].link.answer() {
                 self.died.push((executor, answer));
             }
         }

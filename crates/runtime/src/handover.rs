@@ -1,0 +1,149 @@
+//! Whose the agents of an executor are, when a step does not return.
+//!
+//! A thread cannot be killed, and a step that does not return still holds it. So the core of an executor, with all its agents, can be
+//! taken away from its thread and given to a spare one. The thread pays one load a step for that; the watchdog's side makes the
+//! barrier that orders it behind what the step published.
+//!
+//! ```text
+//!            watchdog: the step of n lasts too long
+//!   n ───────────────────────────────────────────────► n, marked
+//!   ▲                                                   │    │
+//!   └── n came back in time (n itself, or the watchdog) ┘    │ watchdog: n is still in that step
+//!                                                            ▼
+//!   m ◄──────────────── the spare thread m claims it ─────  FREE
+//! ```
+
+use crate::executor::{InStep, Running};
+use crate::sync::{AtomicU32, Ordering, heavy_barrier, named};
+
+/// Stands beside the number of a thread that the watchdog is about to give up.
+const MARK: u32 = 1 << 31;
+/// Stands there while the core waits for a spare thread.
+const FREE: u32 = MARK - 1;
+
+/// The number of the thread that owns a core, perhaps marked, or that nobody does.
+#[derive(Debug)]
+pub(crate) struct Owner(AtomicU32);
+
+impl Owner {
+    pub(crate) fn new(number: u32) -> Owner {
+        Owner(AtomicU32::new(number))
+    }
+
+    /// Whether the core is this thread's, or was given to it.
+    pub(crate) fn is(&self, number: u32) -> bool {
+        self.0.load(Ordering::Acquire) == number
+    }
+
+    /// Whether nobody has taken the core from this thread, whatever the watchdog is about to do.
+    pub(crate) fn is_still(&self, number: u32) -> bool {
+        self.0.load(Ordering::Acquire) & !MARK == number
+    }
+
+    /// After a step: whether the core is still this thread's own. The usual case costs one load.
+    #[inline]
+    pub(crate) fn keeps(&self, number: u32) -> bool {
+        if self.0.load(Ordering::Relaxed) == number {
+            return true;
+        }
+        // The watchdog is about to give this thread up. Whoever makes the exchange first has the core; or it has just seen that the
+        // thread is back, and taken the mark away itself.
+        let exchanged = self.0.compare_exchange(number | MARK, number, Ordering::Relaxed, Ordering::Relaxed);
+        exchanged.is_ok() || exchanged == Err(number)
+    }
+
+    /// The watchdog: takes a core away from a thread that is still in this step. Says whether it did.
+    pub(crate) fn take_from(&self, running: &Running, step: InStep) -> bool {
+        let owner = self.0.load(Ordering::Relaxed);
+        if owner >= FREE
+            || self.0.compare_exchange(owner, owner | MARK, Ordering::Relaxed, Ordering::Relaxed).is_err()
+        {
+            // It is on its way already.
+            return false;
+        }
+        // After this, either the thread is still in the step and will see the mark, or it has left it and that is seen here. And what
+        // it did before the step is seen by who claims the core: the barrier stands between seeing the step and freeing the core.
+        heavy_barrier();
+        let still_in = running.is_still_in(step);
+        let next = if still_in { FREE } else { owner };
+        let done = self.0.compare_exchange(owner | MARK, next, Ordering::Relaxed, Ordering::Relaxed).is_ok();
+        // Otherwise it came back and is at work.
+        still_in && done
+    }
+
+    /// A spare thread: takes a core that was freed.
+    pub(crate) fn claim(&self, number: u32) -> bool {
+        // Pairs with the barrier in `take_from`.
+        let ordering = named("hand-over: claim", Ordering::Acquire);
+        self.0.compare_exchange(FREE, number, ordering, Ordering::Relaxed).is_ok()
+    }
+}
+
+#[cfg(test)]
+#[cfg(loom)]
+#[allow(unsafe_code)] // the core of the model is used as the real one is
+mod model {
+    use super::*;
+    use crate::sync::{UnsafeCell, light_barrier, weaken};
+    use loom::{sync::Arc, thread};
+
+    struct Core {
+        owner: Owner,
+        running: Running,
+        /// What an executor works with: never touched by two threads at once, or loom says so.
+        work: UnsafeCell<u32>,
+    }
+    // SAFETY: that is what the model is to show.
+    unsafe impl Sync for Core {}
+    // SAFETY: plain numbers.
+    unsafe impl Send for Core {}
+
+    fn touch(core: &Core) {
+        // SAFETY: as above.
+        core.work.with_mut(|work| unsafe { *work += 1 });
+    }
+
+    /// A thread makes some steps, the watchdog may take its core in any of them, and the spare thread goes on. One of the two has it.
+    fn steps(count: u64) {
+        let core =
+            Arc::new(Core { owner: Owner::new(1), running: Running::default(), work: UnsafeCell::new(0) });
+        let first = core.clone();
+        let worker = thread::spawn(move || {
+            (0..count).all(|_| {
+                touch(&first);
+                let running = &first.running;
+                running.begin(0);
+                // Here is the step, which touches nothing of the core.
+                running.end();
+                light_barrier();
+                let keeps = first.owner.keeps(1);
+                if keeps {
+                    touch(&first);
+                }
+                keeps
+            })
+        });
+        let second = core.clone();
+        let watchdog = thread::spawn(move || {
+            let running = &second.running;
+            running.in_step().is_some_and(|step| second.owner.take_from(running, step))
+        });
+        let claimed = core.owner.claim(2);
+        if claimed {
+            touch(&core);
+        }
+        let (kept, taken) = (worker.join().unwrap(), watchdog.join().unwrap());
+        assert_ne!(kept, taken, "two have the core, or nobody");
+        assert!(taken || !claimed);
+    }
+
+    #[test]
+    fn a_core_is_never_used_by_two_and_never_lost() {
+        weaken::check(&[], || steps(1));
+    }
+
+    #[test]
+    fn a_later_step_of_the_same_agent_is_another_step() {
+        weaken::check(&[], || steps(2));
+    }
+}
