@@ -6,9 +6,11 @@
 //! | `cargo xtask test --list` | the steps |
 //! | `cargo xtask test --only tidy,unit` | some of them |
 //! | `cargo xtask tidy` | the checks of structure alone: layers, purity, names in the documents |
+//! | `cargo xtask peers` | builds the program that measures other systems beside ours |
 #![allow(clippy::print_stdout, reason = "a program for the terminal")]
 
 mod failure;
+mod peers;
 mod steps;
 mod tidy;
 mod tool;
@@ -20,7 +22,7 @@ use failure::Failure;
 use workspace::Workspace;
 
 /// The words that may follow `cargo xtask`; the documents may name no other.
-const COMMANDS: [&str; 2] = ["test", "tidy"];
+const COMMANDS: [&str; 3] = ["peers", "test", "tidy"];
 
 const USAGE: &str = "\
 Usage: cargo xtask COMMAND
@@ -29,6 +31,7 @@ Usage: cargo xtask COMMAND
   test --list          the steps and what each shows
   test --only A[,B]    only these steps
   tidy                 layers, purity, lengths, and the names in the documents
+  peers                builds other systems, for `sinew bench` to measure beside ours
 
 Environment: SINEW_DATA, the folder with recordings of real robots (default ../shared/data).";
 
@@ -50,6 +53,7 @@ fn run(words: &[&str]) -> Result<(), Failure> {
             println!("{USAGE}");
             Ok(())
         }
+        ["peers"] => peers::build(&Workspace::find()?),
         ["tidy"] => tidy::run(&Workspace::find()?),
         ["test", "--list"] => {
             steps::list();

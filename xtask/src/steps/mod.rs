@@ -10,13 +10,13 @@ mod setup;
 mod sinew;
 
 pub(crate) use lessons::expected_output;
+pub(crate) use setup::{Need, provide};
 
 use std::time::{Duration, Instant};
 
 use crate::failure::Failure;
 use crate::tidy;
 use crate::workspace::Workspace;
-use setup::Need;
 
 /// How a step ended that did not fail.
 pub(crate) enum Done {

@@ -8,6 +8,7 @@ use super::tree::Tree;
 
 /// Where `unsafe` may stand, and why it must.
 pub(crate) const ALLOWED: &[(&str, &str)] = &[
+    ("benches/peers/src/machine.rs", "a call of the operating system"),
     ("crates/hardware/src/latch/page.rs", "the latch is a word in a mapped file"),
     ("crates/runtime/src/context.rs", "what a thread owns is reached through a pointer to it"),
     (
