@@ -123,7 +123,7 @@ fn take(
                 break sample;
             }
             looks += 1;
-            if looks % LOOKS == 0 {
+            if looks.is_multiple_of(LOOKS) {
                 std::thread::yield_now();
             }
         };
@@ -161,7 +161,7 @@ fn send(
         while received.count.load(Ordering::Acquire) != round {
             std::hint::spin_loop();
             looks += 1;
-            if looks % LOOKS == 0 {
+            if looks.is_multiple_of(LOOKS) {
                 std::thread::yield_now();
             }
             if looks > LOOKS * 1_000_000 {

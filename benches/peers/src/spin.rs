@@ -37,11 +37,11 @@ struct Table {
 impl Word {
     /// Polls until the word has a value. Acquire: partner of the releasing stores of the other thread.
     fn wait(&self, value: u64) {
-        let mut looks = 0;
+        let mut looks = 0u32;
         while self.0.load(Ordering::Acquire) != value {
             spin_loop();
             looks += 1;
-            if looks % LOOKS == 0 {
+            if looks.is_multiple_of(LOOKS) {
                 std::thread::yield_now();
             }
         }

@@ -2,6 +2,7 @@
 
 mod hop;
 mod machine;
+mod peers;
 mod simulation;
 mod wake;
 
@@ -49,8 +50,10 @@ pub(super) struct Ratio {
 pub(super) struct Outcome {
     figures: Vec<Measured>,
     ratios: Vec<Ratio>,
-    /// Ratios that need other systems, which are not here.
+    /// Ratios without their other system: it is not here, or nothing asks for it.
     missing: Vec<&'static str>,
+    /// Ratios whose other system is here, but could not be measured; with what it said.
+    failed: Vec<(&'static str, Failure)>,
 }
 
 /// Measures.
@@ -77,11 +80,20 @@ pub(crate) fn bench(args: &BenchArgs, registry: &Registry, json: bool) -> Result
         terminal::say(&outcome.to_text(&args.name));
     }
     for name in &outcome.missing {
-        terminal::tell(&format!(
-            "{name} is missing: the program of the other system is not there to be measured beside ours"
-        ));
+        terminal::tell(&format!("{name} is missing: the other system was not measured beside ours"));
     }
-    Ok(if outcome.missing.is_empty() { ExitCode::SUCCESS } else { ExitCode::FAILURE })
+    if !outcome.missing.is_empty() && peers::Peers::find().is_none() {
+        terminal::tell("`cargo xtask peers` builds the program that measures other systems");
+    }
+    for (name, failure) in &outcome.failed {
+        let what: Vec<&str> = failure.problems.iter().map(|problem| problem.what.as_str()).collect();
+        terminal::tell(&format!("{name} is missing: {}", what.join("\n")));
+    }
+    Ok(if outcome.missing.is_empty() && outcome.failed.is_empty() {
+        ExitCode::SUCCESS
+    } else {
+        ExitCode::FAILURE
+    })
 }
 
 fn list(json: bool) {
@@ -126,6 +138,14 @@ pub(super) fn median(mut values: Vec<f64>) -> f64 {
 }
 
 impl Outcome {
+    /// Adds ours and theirs from rounds in which they took turns: the round whose ratio is in the middle.
+    pub(super) fn compare(&mut self, name: &'static str, mut rounds: Vec<(f64, f64)>) {
+        rounds.sort_by(|a, b| (a.0 / a.1).total_cmp(&(b.0 / b.1)));
+        if let Some(&(ours, theirs)) = rounds.get(rounds.len() / 2) {
+            self.ratios.push(Ratio { name, ours, theirs, value: ours / theirs });
+        }
+    }
+
     fn to_json(&self, name: &str) -> Json {
         let ratios = self.ratios.iter().map(|ratio| {
             json!({"name": ratio.name, "ours": ratio.ours, "theirs": ratio.theirs, "value": ratio.value})

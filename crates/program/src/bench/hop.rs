@@ -12,6 +12,7 @@ use runtime::{
 };
 use types::{Duration, Message};
 
+use super::peers::{self, Peers};
 use super::{Measured, Outcome};
 use crate::error::Failure;
 use crate::terminal::host_now;
@@ -134,6 +135,7 @@ fn plan() -> Plan {
 
 pub(super) fn measure() -> Result<Outcome, Failure> {
     let (mut hops, mut iterations) = (Vec::new(), Vec::new());
+    let mut copper = Peers::find().map(Copper::new);
     for _ in 0..RUNS {
         let (registry, spans) = types(ITERATIONS as usize + 1);
         let options = Options { limit: Some(Duration::millis(ITERATIONS)), ..Options::default() };
@@ -141,10 +143,62 @@ pub(super) fn measure() -> Result<Outcome, Failure> {
         let report = report.map_err(|error| Failure::new(error.to_string()).code(1))?;
         iterations.push(report.wall * 1e9 / ITERATIONS as f64);
         hops.extend(taken(&spans));
+        if let Some(copper) = &mut copper {
+            copper.round();
+        }
     }
-    Ok(Outcome {
-        figures: vec![Measured::new("hop", "ns", hops), Measured::new("iteration", "ns", iterations)],
-        ratios: Vec::new(),
-        missing: vec!["hop/copper", "hop_logged/copper_logged", "fanout64/rtrb"],
-    })
+    let mut outcome = Outcome {
+        figures: vec![Measured::new("hop", "ns", hops), Measured::new("iteration", "ns", iterations.clone())],
+        missing: vec!["hop_logged/copper_logged", "fanout64/rtrb"],
+        ..Outcome::default()
+    };
+    match copper {
+        Some(copper) => copper.beside(&iterations, &mut outcome),
+        None => outcome.missing.push("hop/copper"),
+    }
+    Ok(outcome)
+}
+
+/// Copper's rounds, each right after one of ours.
+struct Copper {
+    peers: Peers,
+    hops: Vec<f64>,
+    iterations: Vec<f64>,
+    failure: Option<Failure>,
+}
+
+impl Copper {
+    fn new(peers: Peers) -> Copper {
+        Copper { peers, hops: Vec::new(), iterations: Vec::new(), failure: None }
+    }
+
+    /// One round; after the first failure there are no more.
+    fn round(&mut self) {
+        if self.failure.is_none() {
+            self.failure = self.measure().err();
+        }
+    }
+
+    fn measure(&mut self) -> Result<(), Failure> {
+        let mut figures = self.peers.measure("hop", &["--iterations", &ITERATIONS.to_string()])?;
+        let means = peers::take(&mut figures, "iteration", "ns")?;
+        self.iterations.push(means.iter().sum::<f64>() / means.len() as f64);
+        self.hops.extend(peers::take(&mut figures, "hop", "ns")?);
+        Ok(())
+    }
+
+    /// Adds its figures, and the ratio of what an iteration takes.
+    fn beside(self, ours: &[f64], outcome: &mut Outcome) {
+        match self.failure {
+            Some(failure) => outcome.failed.push(("hop/copper", failure)),
+            None => {
+                outcome.compare(
+                    "hop/copper",
+                    ours.iter().copied().zip(self.iterations.iter().copied()).collect(),
+                );
+                outcome.figures.push(Measured::new("hop_copper", "ns", self.hops));
+                outcome.figures.push(Measured::new("iteration_copper", "ns", self.iterations));
+            }
+        }
+    }
 }
