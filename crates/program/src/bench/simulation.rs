@@ -18,8 +18,8 @@ use crate::terminal::host_now;
 
 /// Runs of each kind; the same seeds in each.
 const RUNS: u64 = 3;
-/// How much of the scenario is run (simulated time): the robot is on its way through the room, which is its dearest part.
-const LENGTH: Duration = Duration::secs(60);
+/// How much of the scenario is run (simulated time): about as long as the robot needs to its goal.
+const LENGTH: Duration = Duration::secs(300);
 /// What a robot without eyes does not have.
 const EYES: [&str; 3] = ["camera", "track", "head"];
 
