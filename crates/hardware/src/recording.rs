@@ -110,7 +110,7 @@ impl Driver for Recorded {
     fn poll(&mut self, now: Time, wanted: &Listening, sink: &mut dyn Sink) -> Result<Polled, DriverError> {
         let origin = *self.origin.get_or_insert(now);
         while let Some((at, record)) = self.recording.records.get(self.next) {
-            let stamp = origin + *at;
+            let stamp = origin.saturating_add(*at);
             if stamp > now {
                 return Ok(Polled { next: Some(stamp), ..Polled::default() });
             }
@@ -171,6 +171,14 @@ mod tests {
         assert_eq!(times, [0.0, 1.0, 1.0, 1.5, 1.5, 1.5, 2.0]);
         assert_eq!((recording.report.backwards, recording.report.repeated), (2, 1));
         assert_eq!((recording.origin, recording.length()), (32.0, Duration::secs(2)));
+    }
+
+    #[test]
+    fn stamps_that_no_time_can_hold_come_never_and_overflow_nothing() {
+        let mut driver = recording(&[-8.9e9, 8.9e9]).play();
+        let now = Time(1_900_000_000_000_000_000);
+        let polled = driver.poll(now, &Listening::ALL, &mut Heard::default()).unwrap();
+        assert_eq!(polled.next, Some(Time::NEVER));
     }
 
     #[test]

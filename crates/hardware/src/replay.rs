@@ -263,16 +263,17 @@ impl Driver for Replayed {
 
     fn poll(&mut self, now: Time, wanted: &Listening, sink: &mut dyn Sink) -> Result<Polled, DriverError> {
         let origin = *self.origin.get_or_insert(now);
-        let shift = origin - self.log_origin;
+        // A log may hold any times, and what lies at the ends of their range stays there.
+        let shift = Duration(origin.0.saturating_sub(self.log_origin.0));
         loop {
             let next = self.next().map_err(|error| DriverError { what: Cow::Owned(error.to_string()) })?;
             let Some((port, logged)) = next else { return Ok(Polled { ended: true, ..Polled::default() }) };
-            let due = logged.time + shift;
+            let due = logged.time.saturating_add(shift);
             if due > now {
                 self.waiting = Some((port, logged));
                 return Ok(Polled { next: Some(due), ..Polled::default() });
             }
-            let stamp = logged.header.map_or(logged.time, |header| header.stamp) + shift;
+            let stamp = logged.header.map_or(logged.time, |header| header.stamp).saturating_add(shift);
             if self.deliver(port, &logged, stamp, wanted, sink).is_err() {
                 self.bad += 1;
             }

@@ -132,3 +132,24 @@ fn a_log_without_the_robot_names_those_it_has() {
     assert!(matches!(&error, ReplayError::NoRobot { found, .. } if found == "h1"), "{error}");
     std::fs::remove_file(path).unwrap();
 }
+
+#[test]
+fn times_at_the_ends_of_their_range_overflow_nothing() {
+    let path = std::env::temp_dir().join(format!("hardware-replay-{}-far.mcap", std::process::id()));
+    let mut writer = Writer::create(&path, &RunInfo::default()).unwrap();
+    let channel = writer.channel("h1.gyro", &Gyro::definition()).unwrap();
+    let mut out = types::cdr::Writer::new();
+    Gyro::default().encode(&[], Time::ZERO, &mut out);
+    for (time, stamp) in [(0, i64::MIN), (0, i64::MAX), (i64::MAX, 0)] {
+        let header = Header { stamp: Time(stamp), ..Header::default() };
+        writer.write(channel, &header, Time(time), out.bytes()).unwrap();
+    }
+    writer.finish().unwrap();
+    for now in [Time(i64::MIN), Time(1_900_000_000_000_000_000)] {
+        let mut replayed = Replayed::open(&path, "h1").unwrap();
+        let mut heard = Encoded::default();
+        replayed.poll(now, &Listening::ALL, &mut heard).unwrap();
+        assert_eq!((heard.0.len(), replayed.bad()), (2, 0));
+    }
+    std::fs::remove_file(path).unwrap();
+}
