@@ -1,5 +1,7 @@
 //! Reading a world from the tables of its file, with all mistakes at once.
 
+use std::collections::BTreeSet;
+
 use types::geometry::Pose;
 use types::value::{Entry, Mistake, Span, Table, TableReader, Value};
 use types::{Duration, Point};
@@ -8,8 +10,11 @@ use crate::colour::{Colour, NAMES};
 use crate::plan::{Cuboid, Door, Leg, Person, Region, Round, Thing, Wall, WorldPlan};
 use crate::shape;
 
-/// Coordinates beyond this are mistakes (m): the grid has a cell for every half metre.
+/// Coordinates beyond this are mistakes (m).
 const FURTHEST: f64 = 1000.0;
+/// A world that covers more is a mistake (m²): a hall of 200 m by 200 m, or a corridor of two kilometres. The grid of the rays has
+/// four cells for each square metre, the one that looks for a free way four hundred.
+const MOST_AREA: f64 = 40_000.0;
 
 impl WorldPlan {
     /// Reads a world. Gives nothing when there is a mistake, and all mistakes.
@@ -36,15 +41,16 @@ impl WorldPlan {
         let ceiling = plan.ceiling_height;
         plan.regions = r.each("region", read_region);
         plan.walls = r.each("wall", |r| read_wall(r, ceiling));
-        plan.doors = r.each("door", read_door);
+        plan.doors = r.each("door", |r| read_door(r, &plan.walls));
         plan.boxes = r.each("box", read_box);
         plan.rounds = r.each("round", read_round);
         plan.things = r.each("thing", |r| read_thing(r, true));
         let regions: Vec<&str> = plan.regions.iter().map(|region| region.name.as_str()).collect();
         plan.people = r.each("person", |r| read_person(r, &regions));
         r.finish();
-        check_names(&plan, mistakes);
-        check_doors(&plan, mistakes);
+        check_names(table, "regions", &["region"], mistakes);
+        check_names(table, "people or things", &["person", "thing"], mistakes);
+        check_area(table, &plan, mistakes);
         (mistakes.len() == before).then_some(plan)
     }
 }
@@ -201,6 +207,7 @@ fn read_region(r: &mut Reader<'_, '_>) -> Region {
     r.text("name", &mut region.name);
     match r.inner.floats::<4>("rect") {
         Some([x0, y0, x1, y1]) => {
+            [Point::new(x0, y0), Point::new(x1, y1)].map(|corner| r.check_point("rect", corner));
             let (centre, size) =
                 (Point::new((x0 + x1) / 2.0, (y0 + y1) / 2.0), Point::new((x1 - x0).abs(), (y1 - y0).abs()));
             region.polygon = shape::rectangle(centre, size, 0.0).to_vec();
@@ -230,7 +237,7 @@ fn read_wall(r: &mut Reader<'_, '_>, ceiling: f64) -> Wall {
     wall
 }
 
-fn read_door(r: &mut Reader<'_, '_>) -> Door {
+fn read_door(r: &mut Reader<'_, '_>, walls: &[Wall]) -> Door {
     let mut door = Door { name: String::new(), width: 0.9, places: Vec::new(), open: None };
     r.text("name", &mut door.name);
     r.number("width", 0.3, 10.0, &mut door.width);
@@ -240,9 +247,19 @@ fn read_door(r: &mut Reader<'_, '_>) -> Door {
             let at = r.inner.place("places");
             let mut inner = TableReader::new(places, at, "\"places\"");
             for row in places.rows() {
-                if let Some([x, y]) = inner.floats::<2>(&row.key) {
-                    door.places.push((row.key.clone(), Point::new(x, y)));
+                let Some([x, y]) = inner.floats::<2>(&row.key) else { continue };
+                let place = Point::new(x, y);
+                if !walls.iter().any(|wall| crate::outline::opens(wall, place, door.width)) {
+                    let what = format!(
+                        "the place \"{}\" of door \"{}\" lies on no wall that is wide enough",
+                        row.key, door.name
+                    );
+                    inner.report(
+                        Mistake::new(row.entry.at, what)
+                            .help("give the middle of the opening, on the line of a wall"),
+                    );
                 }
+                door.places.push((row.key.clone(), place));
             }
             inner.finish(r.mistakes);
         }
@@ -347,37 +364,45 @@ fn read_when(r: &mut Reader<'_, '_>, key: &str, regions: &[&str]) -> Option<Stri
     Some(word.to_owned())
 }
 
+/// The tables of a list and their places.
+fn tables<'t>(table: &'t Table, key: &str) -> impl Iterator<Item = (&'t Table, Span)> {
+    let list = table.get(key).and_then(|entry| entry.value.as_list()).unwrap_or_default();
+    list.iter().filter_map(|entry| Some((entry.value.as_table()?, entry.at)))
+}
+
 /// No two regions and no two things that a goal can name may share a name.
-fn check_names(plan: &WorldPlan, mistakes: &mut Vec<Mistake>) {
-    let regions: Vec<&str> = plan.regions.iter().map(|item| item.name.as_str()).collect();
-    let people = plan.people.iter().map(|item| item.name.as_str());
-    let named: Vec<&str> = people.chain(plan.things.iter().map(|item| item.name.as_str())).collect();
-    for (kind, names) in [("regions", regions), ("people or things", named)] {
-        let mut sorted: Vec<&str> = names.into_iter().filter(|name| !name.is_empty()).collect();
-        sorted.sort_unstable();
-        for pair in sorted.windows(2) {
-            if pair[0] == pair[1] {
-                mistakes
-                    .push(Mistake::new(Span::default(), format!("two {kind} are called \"{}\"", pair[0])));
-            }
+fn check_names(table: &Table, kind: &str, lists: &[&str], mistakes: &mut Vec<Mistake>) {
+    let mut taken = BTreeSet::new();
+    for (item, _) in lists.iter().flat_map(|list| tables(table, list)) {
+        let Some(Entry { value: Value::Text(name), at }) = item.get("name") else { continue };
+        if !name.is_empty() && !taken.insert(name) {
+            mistakes.push(Mistake::new(*at, format!("two {kind} are called \"{name}\"")));
         }
     }
 }
 
-/// Each place of a door must lie on a wall.
-fn check_doors(plan: &WorldPlan, mistakes: &mut Vec<Mistake>) {
-    for door in &plan.doors {
-        for (name, place) in &door.places {
-            if !plan.walls.iter().any(|wall| crate::outline::opens(wall, *place, door.width)) {
-                let what = format!(
-                    "the place \"{name}\" of door \"{}\" lies on no wall that is wide enough",
-                    door.name
-                );
-                mistakes.push(
-                    Mistake::new(Span::default(), what)
-                        .help("give the middle of the opening, on the line of a wall"),
-                );
-            }
+/// What stands must not cover more than the grids have room for; said once, at what goes too far.
+fn check_area(table: &Table, plan: &WorldPlan, mistakes: &mut Vec<Mistake>) {
+    let (mut min, mut max) =
+        (Point::new(f64::INFINITY, f64::INFINITY), Point::new(-f64::INFINITY, -f64::INFINITY));
+    let walls = plan.walls.iter().map(|wall| (wall.line.clone(), wall.thickness));
+    let boxes = plan.boxes.iter().map(|item| (vec![item.at], item.size.norm() / 2.0));
+    let rounds = plan.rounds.iter().map(|item| (vec![item.at], item.radius));
+    let things = plan.things.iter().map(|item| (vec![item.at], item.radius));
+    let places = ["wall", "box", "round", "thing"].into_iter().flat_map(|list| tables(table, list));
+    for ((points, reach), (_, at)) in walls.chain(boxes).chain(rounds).chain(things).zip(places) {
+        for point in points {
+            min = Point::new(min.x.min(point.x - reach), min.y.min(point.y - reach));
+            max = Point::new(max.x.max(point.x + reach), max.y.max(point.y + reach));
+        }
+        let size = max - min;
+        if size.x * size.y > MOST_AREA {
+            let what = format!(
+                "with this the world is {:.0} m by {:.0} m, and more than {MOST_AREA} m² is too large",
+                size.x, size.y
+            );
+            mistakes.push(Mistake::new(at, what).help("coordinates are in metres"));
+            return;
         }
     }
 }
