@@ -176,7 +176,11 @@ impl Parts<'_> {
             return match (length, length.strip_prefix("<=")) {
                 ("", _) => Ok(Kind::Sequence(element, None)),
                 (_, Some(most)) => Ok(Kind::Sequence(element, Some(most.parse().map_err(|_| bad())?))),
-                (exactly, None) => Ok(Kind::Array(element, exactly.parse().map_err(|_| bad())?)),
+                // A row of none has no bytes, so a row of such rows could be of any length and nothing would end it.
+                (exactly, None) => match exactly.parse().map_err(|_| bad())? {
+                    0 => Err(bad()),
+                    n => Ok(Kind::Array(element, n)),
+                },
             };
         }
         let (base, bound) = match text.split_once("<=") {
@@ -329,5 +333,7 @@ mod tests {
             (0..40).map(|i| format!("===\nMSG: a/T{i}\nT{} x\nT{} y\n", i + 1, i + 1)).collect();
         assert_eq!(parse(&format!("T0 x\n{doubled}===\nMSG: a/T40\nbool x\n")), ParseError::TooLarge);
         assert_eq!(parse("int32[x] x\n"), ParseError::NoSuchType("int32[x]".into()));
+        let many_times_nothing = "None[4000000000] rows\n===\nMSG: a/None\nint8[0] nothing\n";
+        assert_eq!(parse(many_times_nothing), ParseError::NoSuchType("int8[0]".into()));
     }
 }
