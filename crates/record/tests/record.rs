@@ -142,7 +142,7 @@ fn read(bytes: Vec<u8>) -> Vec<log::Message> {
 fn check_prefix(messages: &[log::Message]) -> u64 {
     for (i, message) in (0..).zip(messages) {
         assert_eq!(message.channel.topic, ["/h1/drive", "/h1/offer"][i as usize % 2]);
-        assert_eq!(message.channel.definition, "geometry_msgs/msg/Twist");
+        assert_eq!(&*message.channel.definition, "geometry_msgs/msg/Twist");
         assert_eq!(message.header, Some(header(i, time(i))));
         assert_eq!(message.time, time(i));
         assert_eq!(message.cdr, twist(i));
@@ -271,6 +271,42 @@ fn a_definition_is_shared_by_name_and_cannot_have_two_forms() {
     assert!(matches!(writer.channel("/c", &other), Err(log::WriteError::TwoForms(_))));
 }
 
+/// A record of a file: its code, the length of its body, the body.
+fn piece(code: u8, body: &[u8]) -> Vec<u8> {
+    [&[code][..], &(body.len() as u64).to_le_bytes(), body].concat()
+}
+
+fn text(text: &str) -> Vec<u8> {
+    [&(text.len() as u32).to_le_bytes()[..], text.as_bytes()].concat()
+}
+
+#[test]
+fn the_topics_of_a_definition_hold_it_once() {
+    let schema =
+        piece(3, &[&1u16.to_le_bytes()[..], &text("a/msg/A"), &text("ros2msg"), &text("bool a\n")].concat());
+    let topic = |id: u16| {
+        let channel =
+            [&id.to_le_bytes()[..], &1u16.to_le_bytes(), &text("/a"), &text("cdr"), &0u32.to_le_bytes()];
+        let message = [&id.to_le_bytes()[..], &[0; 20], &[0, 1, 0, 0, 1]];
+        [piece(4, &channel.concat()), piece(5, &message.concat())].concat()
+    };
+    let bytes = [mcap::MAGIC, &schema, &topic(1), &topic(2)].concat();
+    let messages = read(bytes);
+    let [one, two] = messages.as_slice() else { panic!("{messages:?}") };
+    assert_ne!(one.channel.id, two.channel.id);
+    assert!(std::ptr::eq(&*one.channel.definition_text, &*two.channel.definition_text));
+    assert!(std::ptr::eq(one.channel.schema().unwrap(), two.channel.schema().unwrap()));
+}
+
+#[test]
+fn a_chunk_that_claims_more_than_any_memory_has_is_not_unpacked() {
+    let claimed = 1u64 << 40;
+    let body = [&[0; 16][..], &claimed.to_le_bytes(), &[0; 4], &text("lz4"), &0u64.to_le_bytes()].concat();
+    let folder = Folder::new("claims");
+    let info = log::info(folder.file("a.mcap", &[mcap::MAGIC, &piece(6, &body)].concat())).unwrap();
+    assert_eq!(info.damage[0].cause, Cause::TooLarge);
+}
+
 #[test]
 fn the_info_tells_topics_rates_and_span() {
     let folder = Folder::new("info");
@@ -297,7 +333,7 @@ fn a_note_is_a_ros_log_message() {
     writer.finish().unwrap();
     let messages = read(memory.bytes());
     assert_eq!(messages[0].channel.topic, log::ROSOUT);
-    assert_eq!(messages[0].channel.definition, "rcl_interfaces/msg/Log");
+    assert_eq!(&*messages[0].channel.definition, "rcl_interfaces/msg/Log");
     let expected = "{ stamp = { sec = 1, nanosec = 500000000 }, level = 40, name = \"safety\", msg = \"stop\", file = \"\", \
                     function = \"\", line = 0 }";
     assert_eq!(messages[0].value().unwrap().to_string(), expected);

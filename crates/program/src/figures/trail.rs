@@ -142,7 +142,7 @@ impl Trail {
             return;
         }
         self.sent.entry(agent.to_owned()).or_default().push(time);
-        match message.channel.definition.as_str() {
+        match &*message.channel.definition {
             Decision::NAME => self.decision(time, message),
             Echoes::NAME if self.is_robot(agent) => self.echoes(agent, message),
             LaserScan::NAME if self.is_robot(agent) && port == "scan" => self.scan(agent, message),

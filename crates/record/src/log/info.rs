@@ -65,7 +65,7 @@ pub fn info(path: impl AsRef<Path>) -> Result<Info, ReadError> {
         let channel = &message.channel;
         let topic = topics.entry((channel.topic.clone(), channel.id)).or_insert_with(|| TopicInfo {
             topic: channel.topic.clone(),
-            definition: channel.definition.clone(),
+            definition: channel.definition.to_string(),
             messages: 0,
             bytes: 0,
             first: message.time,

@@ -19,6 +19,10 @@ const MESSAGE_INDEX: u8 = 0x07;
 const ATTACHMENT: u8 = 0x09;
 const METADATA: u8 = 0x0c;
 
+/// More than a chunk has (bytes): ours close at 8 MiB, those of others at one or a few. It is in memory as a whole, and a few
+/// packed bytes may claim any size.
+const MOST_IN_CHUNK: u64 = 256 << 20;
+
 /// A part of a log that cannot be read.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Damage {
@@ -43,6 +47,8 @@ pub enum Cause {
     Changed,
     /// It is packed in a way that is not supported: only lz4 is.
     Packing,
+    /// It would need more memory than a chunk may: 256 MiB.
+    TooLarge,
 }
 
 impl Damage {
@@ -58,6 +64,7 @@ impl std::fmt::Display for Damage {
             Cause::Cut => "the file ends in the middle of a record",
             Cause::Changed => "the bytes are not those that were written",
             Cause::Packing => "it is packed in a way that is not supported (only lz4 is)",
+            Cause::TooLarge => "it is larger than a chunk may be (256 MiB)",
         };
         write!(f, "byte {}: {what}, {} bytes cannot be read", self.at, self.bytes)?;
         match (self.messages, self.span) {
@@ -177,7 +184,11 @@ fn chunk_records(body: &[u8]) -> Result<Vec<Record<'static>>, Bad> {
             Some((op as u8, rest.take(length)?))
         };
         let (op, record) = next().ok_or(Bad(Cause::Changed))?;
-        records.push(single(op, record)?);
+        match single(op, record)? {
+            // Only a place of its number would be left of it, which is larger than itself.
+            Record::Unknown { .. } => {}
+            known => records.push(known),
+        }
     }
     Ok(records)
 }
@@ -185,6 +196,9 @@ fn chunk_records(body: &[u8]) -> Result<Vec<Record<'static>>, Bad> {
 /// The bytes of a chunk, checked.
 fn unpacked(header: &ChunkHeader, data: Vec<u8>) -> Result<Vec<u8>, Bad> {
     let changed = |_| Bad(Cause::Changed);
+    if header.uncompressed_size > MOST_IN_CHUNK {
+        return Err(Bad(Cause::TooLarge));
+    }
     let bytes = match header.compression.as_str() {
         "" => data,
         "lz4" => {

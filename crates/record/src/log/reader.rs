@@ -40,12 +40,20 @@ pub struct Channel {
     /// Its name.
     pub topic: String,
     /// The name of its definition, as in `geometry_msgs/msg/Twist`.
-    pub definition: String,
+    pub definition: Arc<str>,
     /// The definition as the file has it.
-    pub definition_text: String,
+    pub definition_text: Arc<str>,
     /// How the messages are encoded; `cdr` for those of ROS 2.
     pub encoding: String,
-    schema: OnceLock<Result<Schema, ParseError>>,
+    schema: Arc<OnceLock<Result<Schema, ParseError>>>,
+}
+
+/// A definition of a file. All its topics share it: a file may give a long one to each of 65 535 topics in a few bytes.
+#[derive(Clone, Default)]
+struct Form {
+    name: Arc<str>,
+    text: Arc<str>,
+    schema: Arc<OnceLock<Result<Schema, ParseError>>>,
 }
 
 impl Channel {
@@ -88,7 +96,7 @@ impl Message {
     /// The message as a tree of values.
     pub fn value(&self) -> Result<Value, DecodeError> {
         let schema = self.channel.schema().map_err(|cause| DecodeError::Definition {
-            definition: self.channel.definition.clone(),
+            definition: self.channel.definition.to_string(),
             cause: cause.clone(),
         })?;
         Ok(dynamic::decode(schema, &self.cdr)?)
@@ -102,7 +110,7 @@ impl Message {
 pub struct Reader {
     path: String,
     pieces: Pieces<Box<dyn Read + Send>>,
-    schemas: HashMap<u16, (String, String)>,
+    schemas: HashMap<u16, Form>,
     channels: HashMap<u16, Arc<Channel>>,
     /// The header that was read last, for the message behind it.
     waiting: Option<(u16, Header)>,
@@ -210,18 +218,19 @@ impl Reader {
         match record {
             Record::Header(header) => (self.profile, self.library) = (header.profile, header.library),
             Record::Schema { header, data } => {
-                self.schemas.insert(header.id, (header.name, String::from_utf8_lossy(&data).into_owned()));
+                let (name, text) = (header.name.into(), String::from_utf8_lossy(&data).into());
+                self.schemas.insert(header.id, Form { name, text, schema: Arc::default() });
             }
             Record::Channel(channel) => {
-                let (definition, text) = self.schemas.get(&channel.schema_id).cloned().unwrap_or_default();
+                let form = self.schemas.get(&channel.schema_id).cloned().unwrap_or_default();
                 self.channels.entry(channel.id).or_insert_with(|| {
                     Arc::new(Channel {
                         id: channel.id,
                         topic: channel.topic,
-                        definition,
-                        definition_text: text,
+                        definition: form.name,
+                        definition_text: form.text,
                         encoding: channel.message_encoding,
-                        schema: OnceLock::new(),
+                        schema: form.schema,
                     })
                 });
             }
