@@ -1,7 +1,7 @@
 //! Values of files and parameters as JSON, and back.
 
 use serde_json::{Map, Value as Json};
-use types::value::{Entry, Table, Value};
+use types::value::{Entry, Row, Span, Table, Value};
 
 /// A value as JSON. Numbers that JSON does not know become the texts `"inf"`, `"-inf"` and `"nan"`.
 pub fn to_json(value: &Value) -> Json {
@@ -38,7 +38,9 @@ pub fn from_json(json: &Json) -> Value {
         Json::Object(rows) => {
             let mut table = Table::new();
             for (key, item) in rows.iter().filter(|(_, item)| !item.is_null()) {
-                table.set(key, from_json(item));
+                // The keys of an object are all different: looking for each among those before would only take long.
+                let row = Row { key: key.clone(), key_at: Span::default(), entry: from_json(item).into() };
+                table.push(row);
             }
             Value::Table(table)
         }

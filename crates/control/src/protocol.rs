@@ -37,7 +37,7 @@ const fn usage(verb: &'static str, form: &'static str, does: &'static str) -> wo
 
 /// What a client asks.
 #[derive(Clone, Debug, PartialEq)]
-pub(crate) struct Question {
+pub struct Question {
     /// Its number, given back with the answer.
     pub id: Json,
     /// What to do, in words.
@@ -48,7 +48,7 @@ pub(crate) struct Question {
 
 impl Question {
     /// Reads a line. A refusal comes with the number of the question, if that could be read.
-    pub(crate) fn read(line: &[u8]) -> Result<Question, (Json, Refusal)> {
+    pub fn read(line: &[u8]) -> Result<Question, (Json, Refusal)> {
         let mut id = Json::Null;
         Question::read_with(line, &mut id).map_err(|refusal| (id, refusal))
     }
@@ -79,7 +79,7 @@ impl Question {
     }
 
     /// Writes it as a line.
-    pub(crate) fn line(&self) -> String {
+    pub fn line(&self) -> String {
         let mut json = json!({"id": self.id, "do": self.words});
         if let Some(message) = &self.message {
             json["message"] = message.clone();

@@ -57,6 +57,9 @@ pub const CHANGES: [Usage; 10] = [
 /// What stands between requests that are done together or not at all.
 pub const AND: &str = ";";
 
+/// Pairs of a request, and rows of a table in a value, at most: each is compared with all before it, and people type ten.
+pub(crate) const MOST_PAIRS: usize = 4096;
+
 /// The keys of `wire`.
 pub(crate) const WIRE_KEYS: [&str; 7] =
     ["depth", "overload", "every", "priority", "marker", "category", "recipient"];

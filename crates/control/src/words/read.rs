@@ -7,7 +7,7 @@ use types::header::LeastPriority;
 use types::value::Table;
 use types::{Category, Duration, Priority};
 
-use super::{AND, CHANGES, WIRE_KEYS, read_value};
+use super::{AND, CHANGES, MOST_PAIRS, WIRE_KEYS, read_value};
 
 type Read<T> = Result<T, Refusal>;
 
@@ -113,8 +113,8 @@ fn read_add(words: &[String]) -> Read<AgentPlan> {
     if let Some(inputs) = pairs.take("on") {
         plan.on = inputs
             .split(',')
-            .filter(|input| !input.is_empty())
             .map(|input| input.trim().to_owned())
+            .filter(|input| !input.is_empty())
             .collect();
     }
     if let Some(word) = pairs.take("on_death") {
@@ -200,6 +200,10 @@ pub(crate) struct Pairs<'a> {
 
 impl<'a> Pairs<'a> {
     pub(crate) fn read(verb: &str, words: &'a [String]) -> Read<Pairs<'a>> {
+        if words.len() > MOST_PAIRS {
+            let what = format!("there are {} pairs of KEY=VALUE, at most {MOST_PAIRS} are read", words.len());
+            return Err(Refusal::new(what));
+        }
         let mut pairs: Vec<(&str, &str)> = Vec::new();
         for word in words {
             let pair = word.split_once('=').filter(|(key, _)| !key.is_empty());

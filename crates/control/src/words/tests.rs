@@ -23,6 +23,24 @@ fn shown(line: &str) -> String {
 }
 
 #[test]
+fn blanks_between_commas_are_no_input() {
+    let Ok(Request::Add(plan)) = parse(&["add", "a", "is", "b", "on= ,x, "].map(str::to_owned)) else {
+        panic!("no agent")
+    };
+    assert_eq!(plan.on, ["x"]);
+}
+
+#[test]
+fn more_pairs_than_anybody_types_are_refused() {
+    let pairs: String = (0..5000).map(|n| format!(" k{n}=1")).collect();
+    assert!(read(&format!("set a{pairs}")).unwrap_err().what.contains("5000"));
+    let rows: Vec<String> = (0..5000).map(|n| format!("k{n}=1")).collect();
+    let refused = read_value(&format!("{{{}}}", rows.join(","))).unwrap_err();
+    assert!(refused.what.contains("at most 4096"), "{refused}");
+    assert!(read_value(&format!("{{{}}}", rows[..4096].join(","))).is_ok());
+}
+
+#[test]
 fn every_request_can_be_said() {
     let Ok(Request::Add(plan)) = read(
         "add sonar is sonar robot=h1 period=250ms period_range=100ms..1s on=echoes,ticks near=0.25 side=left",

@@ -3,6 +3,8 @@
 use runtime::Refusal;
 use types::value::{Entry, Row, Span, Table, Value};
 
+use super::MOST_PAIRS;
+
 /// Lists and tables inside each other, at most: people write three.
 const DEEPEST: usize = 32;
 
@@ -120,6 +122,9 @@ impl Reader<'_> {
     fn table(&mut self, depth: usize) -> Result<Value, Wanted> {
         let mut table = Table::new();
         while !self.take('}') {
+            if table.len() == MOST_PAIRS {
+                return Err(format!("the end of a table of at most {MOST_PAIRS} rows"));
+            }
             let key = if self.take('"') { self.quoted()? } else { self.bare(&['=', ',', '}']) };
             if !self.take('=') {
                 return Err("\"=\"".into());
