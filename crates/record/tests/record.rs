@@ -340,6 +340,17 @@ fn a_note_is_a_ros_log_message() {
 }
 
 #[test]
+fn a_lost_header_costs_no_message() {
+    let folder = Folder::new("headless");
+    let mut bytes = written(45);
+    // The length of the header's first text, behind the magic and the header's code and length.
+    bytes[mcap::MAGIC.len() + 9 + 3] = 0xff;
+    let report = log::repair(folder.file("headless.mcap", &bytes), folder.0.join("whole.mcap")).unwrap();
+    assert_eq!((report.messages, report.lost.len()), (45, 1));
+    assert_eq!(check_prefix(&read(std::fs::read(folder.0.join("whole.mcap")).unwrap())), 45);
+}
+
+#[test]
 fn a_cut_file_is_mended_and_the_loss_is_told() {
     let folder = Folder::new("repair");
     let bytes = written(45);

@@ -146,6 +146,10 @@ impl Copy {
     }
 
     fn record(&mut self, record: Record<'_>) -> Result<(), McapError> {
+        // Where the old file's header is lost, ours stands in its place: it names no more than profile and program.
+        if self.out.is_none() {
+            self.out = self.disk.take().map(|disk| options().create(disk)).transpose()?;
+        }
         let Some(out) = self.out.as_mut() else { return Ok(()) };
         match record {
             Record::Schema { header, data } => {
