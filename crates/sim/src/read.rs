@@ -207,7 +207,9 @@ fn read_region(r: &mut Reader<'_, '_>) -> Region {
     r.text("name", &mut region.name);
     match r.inner.floats::<4>("rect") {
         Some([x0, y0, x1, y1]) => {
-            [Point::new(x0, y0), Point::new(x1, y1)].map(|corner| r.check_point("rect", corner));
+            for corner in [Point::new(x0, y0), Point::new(x1, y1)] {
+                r.check_point("rect", corner);
+            }
             let (centre, size) =
                 (Point::new((x0 + x1) / 2.0, (y0 + y1) / 2.0), Point::new((x1 - x0).abs(), (y1 - y0).abs()));
             region.polygon = shape::rectangle(centre, size, 0.0).to_vec();
