@@ -9,6 +9,9 @@ use types::{Category, Duration, Priority};
 
 use super::{AND, CHANGES, MOST_PAIRS, WIRE_KEYS, read_value};
 
+/// Longer than anything that robots do. Several such times can be added and each taken four times without an overflow.
+const LONGEST: Duration = Duration::secs(10 * 365 * 24 * 3600);
+
 type Read<T> = Result<T, Refusal>;
 
 /// Reads a request.
@@ -136,7 +139,12 @@ fn read_range(text: &str) -> Read<(Duration, Duration)> {
 }
 
 fn read_span(key: &str, text: &str) -> Read<Duration> {
-    text.parse().map_err(|error| Refusal::new(format!("{key} is \"{text}\": {error}")))
+    let span: Duration =
+        text.parse().map_err(|error| Refusal::new(format!("{key} is \"{text}\": {error}")))?;
+    if span > LONGEST || span < -LONGEST {
+        return Err(Refusal::new(format!("{key} is \"{text}\", which is longer than ten years")));
+    }
+    Ok(span)
 }
 
 fn read_wire(words: &[String]) -> Read<WirePlan> {

@@ -31,6 +31,14 @@ fn blanks_between_commas_are_no_input() {
 }
 
 #[test]
+fn times_that_overflow_when_they_are_taken_four_times_are_refused() {
+    for span in ["2500000h", "-2500000h"] {
+        let refused = read(&format!("add a is b period={span}")).unwrap_err();
+        assert!(refused.what.contains("longer than ten years"), "{refused}");
+    }
+}
+
+#[test]
 fn more_pairs_than_anybody_types_are_refused() {
     let pairs: String = (0..5000).map(|n| format!(" k{n}=1")).collect();
     assert!(read(&format!("set a{pairs}")).unwrap_err().what.contains("5000"));
