@@ -90,7 +90,8 @@ impl Message for Image {
     fn encode(&self, row: &[u8], stamp: Time, out: &mut Writer) {
         out.header(stamp, self.frame.as_str());
         out.put(self.height).put(self.width).text(self.encoding.ros());
-        out.put(0u8).put(self.width * self.encoding.bytes() as u32).row(row);
+        // A width from elsewhere may be any number; no picture is so wide that this changes it.
+        out.put(0u8).put(self.width.saturating_mul(self.encoding.bytes() as u32)).row(row);
     }
 
     /// The opening of the view is not part of a `sensor_msgs/Image`: it comes back as zero.
@@ -118,5 +119,19 @@ impl Message for Image {
         for pixel in row {
             *pixel = if wild { (draw() * 256.0) as u8 } else { *pixel / 3 };
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_width_that_no_picture_has_overflows_nothing() {
+        let wide = Image { width: u32::MAX, ..Image::default() };
+        let mut out = Writer::new();
+        wide.encode(&[], Time::ZERO, &mut out);
+        let again = Image::decode(&mut Reader::new(out.bytes()).unwrap(), &mut Vec::new());
+        assert_eq!(again.map(|image| image.width), Ok(u32::MAX));
     }
 }
