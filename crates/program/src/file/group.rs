@@ -128,6 +128,13 @@ impl Reader<'_> {
             return;
         };
         for row in ports.rows() {
+            // With a dot it could be the port of an agent in the group, and so stand for itself.
+            if row.key.contains('.') {
+                let what = format!("\"{}\" cannot be the name of a port of the whole", row.key);
+                let help = format!("a name without a dot, as in pose = {}", row.entry.value);
+                self.mistakes.push(Mistake::new(row.key_at, what).help(help));
+                continue;
+            }
             match row.entry.value.as_text().filter(|target| target.contains('.')) {
                 Some(target) => {
                     let target = format!("{prefix}{target}");

@@ -62,6 +62,10 @@ impl Shelf {
         let plain = folder.join(name);
         let with_ending = folder.join(format!("{name}.toml"));
         let path = if plain.is_file() || !with_ending.is_file() { plain } else { with_ending };
+        // A device may have no end, a pipe nobody who writes.
+        if fs::metadata(&path).is_ok_and(|found| !found.is_file()) {
+            return Err(mistake(format!("{} is no file", path.display())));
+        }
         match fs::read(&path) {
             Ok(bytes) => {
                 let shown = path.strip_prefix("./").unwrap_or(&path).display().to_string();
@@ -132,6 +136,14 @@ mod tests {
         let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../worlds");
         let mistake = Shelf::Worlds.find("anex.toml", &folder).unwrap_err();
         assert_eq!(mistake.to_string(), "there is no file \"anex.toml\"; did you mean \"annex.toml\"?");
+    }
+
+    #[test]
+    fn what_is_no_file_is_not_read() {
+        for name in ["/dev/null", env!("CARGO_MANIFEST_DIR")] {
+            let mistake = Shelf::Worlds.find(name, Path::new("")).unwrap_err();
+            assert_eq!(mistake.what, format!("{name} is no file"));
+        }
     }
 
     #[test]

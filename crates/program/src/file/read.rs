@@ -17,6 +17,8 @@ use super::{decide, set, tree};
 /// The sections of a system file.
 pub(crate) const SECTIONS: [&str; 10] =
     ["name", "world", "robot", "executor", "agent", "wires", "decide", "goal", "vary", "at"];
+/// Longer than anything that robots do. Several such times can be added and each taken four times without an overflow.
+const LONGEST: Duration = Duration::secs(10 * 365 * 24 * 3600);
 /// The agent type that a robot is.
 pub(super) const ROBOT: &str = "robot";
 /// The entries of a robot that are not its model's.
@@ -395,6 +397,10 @@ pub(super) fn span_of_time(r: &mut TableReader<'_>, key: &str) -> Option<Duratio
         return None;
     }
     let span = r.duration(key)?;
+    if span > LONGEST {
+        r.report(Mistake::new(entry.at, format!("\"{key}\" is {span}, which is longer than ten years")));
+        return None;
+    }
     if span < Duration::ZERO {
         r.report(Mistake::new(entry.at, format!("\"{key}\" is {span}, a time cannot be negative")));
         return None;

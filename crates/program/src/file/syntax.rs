@@ -17,6 +17,8 @@ pub(super) fn mistakes(text: &str) -> Vec<(Range<usize>, Mistake)> {
         let (_, errors) = DeTable::parse_recoverable(&rest);
         let seen = errors.iter().map(|error| (seen(error.span().unwrap_or(0..0), &rest), error.message()));
         let Some((range, message)) = seen.min_by_key(|(range, _)| range.start) else { break };
+        // What was taken out may have been half of a letter.
+        let range = text.floor_char_boundary(range.start)..text.ceil_char_boundary(range.end);
         // An open bracket swallows what follows: whatever the parser says after it is not the cause.
         match open_bracket(&rest).filter(|open| open.bracket <= range.start) {
             Some(Open { bracket, ends }) => {
@@ -70,7 +72,12 @@ fn seen(range: Range<usize>, text: &str) -> Range<usize> {
     }
     let end = text[..start].trim_end_matches([' ', '\t', '\r', '\n']).len();
     let begin = text[..end].rfind(|c: char| c.is_whitespace()).map_or(0, |at| at + 1);
-    begin..end
+    if begin < end {
+        return begin..end;
+    }
+    // Nothing stands before it: a place is at least one letter wide.
+    let start = start.min(text.len().saturating_sub(1));
+    start..(start + 1).min(text.len())
 }
 
 /// The parser's message about `word` in our words.
@@ -148,19 +155,28 @@ struct Open {
 
 /// The bracket of a value that is still open when a new section, a new entry or the end of the text comes.
 fn open_bracket(text: &str) -> Option<Open> {
-    let mut open: Vec<usize> = Vec::new();
+    let mut open: Vec<Bracket> = Vec::new();
     let mut offset: usize = 0;
     for line in text.split_inclusive('\n') {
-        let in_list = open.iter().any(|&at| text[at..].starts_with('['));
-        if let (Some(&bracket), true) = (open.last(), is_heading(line) || (in_list && is_entry(line))) {
-            return Some(Open { bracket, ends: offset.saturating_sub(1) });
+        if let Some(&Bracket { at, in_list }) = open.last()
+            && (is_heading(line) || (in_list && is_entry(line)))
+        {
+            return Some(Open { bracket: at, ends: offset.saturating_sub(1) });
         }
         if !(open.is_empty() && line.trim_start().starts_with('[')) {
             scan(line, offset, &mut open);
         }
         offset += line.len();
     }
-    open.last().map(|&bracket| Open { bracket, ends: text.len() })
+    open.last().map(|bracket| Open { bracket: bracket.at, ends: text.len() })
+}
+
+/// A bracket on the way through a text.
+#[derive(Clone, Copy)]
+struct Bracket {
+    at: usize,
+    /// It, or one around it, begins a list.
+    in_list: bool,
 }
 
 /// `[agent.sonar]` or `[[at]]`, which inside a list would be a list of a word without quotes.
@@ -183,7 +199,7 @@ fn is_entry(line: &str) -> bool {
 }
 
 /// Follows the brackets of a line; texts and comments are passed over.
-fn scan(line: &str, offset: usize, open: &mut Vec<usize>) {
+fn scan(line: &str, offset: usize, open: &mut Vec<Bracket>) {
     let mut quote = None;
     let mut escaped = false;
     for (at, c) in line.char_indices() {
@@ -194,7 +210,10 @@ fn scan(line: &str, offset: usize, open: &mut Vec<usize>) {
             (Some(_), _) => {}
             (None, '"' | '\'') => quote = Some(c),
             (None, '#') => return,
-            (None, '[' | '{') => open.push(offset + at),
+            (None, '[' | '{') => {
+                let in_list = c == '[' || open.last().is_some_and(|around| around.in_list);
+                open.push(Bracket { at: offset + at, in_list });
+            }
             (None, ']' | '}') => {
                 open.pop();
             }
@@ -213,7 +232,14 @@ mod tests {
         #[test]
         fn what_is_refused_has_a_mistake(text in "([\\[\\]{}=\"' ,.a-c1\n#]|\\[a\\]\n|a = 1\n|ä){0,40}") {
             prop_assert_eq!(mistakes(&text).is_empty(), DeTable::parse(&text).is_ok());
+            prop_assert!(mistakes(&text).iter().all(|(range, _)| range.start < range.end), "each has a place");
         }
+    }
+
+    #[test]
+    fn a_mistake_with_nothing_before_it_has_a_place() {
+        let ranges: Vec<_> = mistakes("]").into_iter().map(|(range, _)| range).collect();
+        assert_eq!(ranges, [0..1]);
     }
 
     #[test]
