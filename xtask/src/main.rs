@@ -33,7 +33,8 @@ Usage: cargo xtask COMMAND
   tidy                 layers, purity, lengths, and the names in the documents
   peers                builds other systems, for `sinew bench` to measure beside ours
 
-Environment: SINEW_DATA, the folder with recordings of real robots (default ../shared/data).";
+Environment: SINEW_DATA, the folder with recordings of real robots (default ../shared/data);
+SINEW_FUZZ_SECONDS, how long each target of the step fuzz runs (default 10).";
 
 fn main() -> ExitCode {
     let words: Vec<String> = std::env::args().skip(1).collect();

@@ -63,6 +63,13 @@ impl Tool {
         Ok((line, output))
     }
 
+    /// Runs it and takes what it writes to standard error; whether it ended well comes with it.
+    pub(crate) fn told(mut self) -> Result<(bool, String), Failure> {
+        let line = self.show();
+        let output = self.command.output().map_err(|error| cannot_start(&line, &error))?;
+        Ok((output.status.success(), String::from_utf8_lossy(&output.stderr).into_owned()))
+    }
+
     /// Like `output`, but any code but 0 is a failure.
     pub(crate) fn text(self, remedy: &str) -> Result<String, Failure> {
         let (line, output) = self.output()?;

@@ -16,6 +16,8 @@ pub(crate) struct Workspace {
     pub(crate) root: PathBuf,
     /// Where cargo builds.
     pub(crate) target: PathBuf,
+    /// The kind of this machine, as rustc names it.
+    pub(crate) host: String,
     /// What `cargo metadata` says.
     pub(crate) metadata: Value,
 }
@@ -24,12 +26,13 @@ impl Workspace {
     pub(crate) fn find() -> Result<Workspace, Failure> {
         let here = Path::new(env!("CARGO_MANIFEST_DIR"));
         let root = here.parent().unwrap_or(here).to_owned();
-        let metadata = metadata(&root)?;
+        let host = host(&root)?;
+        let metadata = metadata(&root, &host)?;
         let target = match metadata["target_directory"].as_str() {
             Some(folder) => PathBuf::from(folder),
             None => root.join("target"),
         };
-        Ok(Workspace { root, target, metadata })
+        Ok(Workspace { root, target, host, metadata })
     }
 
     /// A folder for what the steps make.
@@ -62,23 +65,27 @@ impl Workspace {
     }
 }
 
-/// Only the packages for this kind of machine, so that cargo need not fetch those for others.
-fn metadata(root: &Path) -> Result<Value, Failure> {
-    let remedy = "Cargo cannot read the workspace: `cargo metadata` says why.";
-    let failed = |what: String| Failure::new(what, remedy);
-    let text = |program: &str, args: &[&str]| {
-        let output = Command::new(program).args(args).current_dir(root).output();
-        let output = output.map_err(|error| failed(format!("{program}: {error}")))?;
-        if output.status.success() {
-            return Ok(String::from_utf8_lossy(&output.stdout).into_owned());
-        }
-        Err(failed(format!("{program} {}\n{}", args.join(" "), String::from_utf8_lossy(&output.stderr))))
-    };
-    let rustc = std::env::var("RUSTC").unwrap_or_else(|_| "rustc".into());
-    let about = text(&rustc, &["-vV"])?;
+const REMEDY: &str = "Cargo cannot read the workspace: `cargo metadata` says why.";
+
+fn host(root: &Path) -> Result<String, Failure> {
+    let about = text(&std::env::var("RUSTC").unwrap_or_else(|_| "rustc".into()), &["-vV"], root)?;
     let host = about.lines().find_map(|line| line.strip_prefix("host: "));
-    let host = host.ok_or_else(|| failed(format!("rustc names no host:\n{about}")))?;
+    host.map(str::to_owned).ok_or_else(|| Failure::new(format!("rustc names no host:\n{about}"), REMEDY))
+}
+
+/// Only the packages for this kind of machine, so that cargo need not fetch those for others.
+fn metadata(root: &Path, host: &str) -> Result<Value, Failure> {
     let cargo = std::env::var("CARGO").unwrap_or_else(|_| "cargo".into());
-    let json = text(&cargo, &["metadata", "--format-version", "1", "--filter-platform", host])?;
-    serde_json::from_str(&json).map_err(|error| failed(format!("cargo metadata: {error}")))
+    let json = text(&cargo, &["metadata", "--format-version", "1", "--filter-platform", host], root)?;
+    serde_json::from_str(&json).map_err(|error| Failure::new(format!("cargo metadata: {error}"), REMEDY))
+}
+
+fn text(program: &str, args: &[&str], root: &Path) -> Result<String, Failure> {
+    let failed = |what: String| Failure::new(what, REMEDY);
+    let output = Command::new(program).args(args).current_dir(root).output();
+    let output = output.map_err(|error| failed(format!("{program}: {error}")))?;
+    if output.status.success() {
+        return Ok(String::from_utf8_lossy(&output.stdout).into_owned());
+    }
+    Err(failed(format!("{program} {}\n{}", args.join(" "), String::from_utf8_lossy(&output.stderr))))
 }

@@ -12,6 +12,10 @@ fn passed() -> Result<Done, Failure> {
 pub(super) fn format(workspace: &Workspace) -> Result<Done, Failure> {
     let cargo = Tool::cargo(&workspace.root).args(["fmt", "--all", "--", "--check", "-l"]);
     cargo.run("`cargo fmt --all` puts it right.")?;
+    let words = ["fmt", "--manifest-path", "fuzz/Cargo.toml", "--", "--check", "-l"];
+    Tool::cargo(&workspace.root)
+        .args(words)
+        .run("`cargo fmt --manifest-path fuzz/Cargo.toml` puts it right.")?;
     passed()
 }
 

@@ -1,6 +1,7 @@
 //! `cargo xtask test`: everything that must hold, step by step.
 
 mod cargo;
+mod fuzz;
 mod lessons;
 mod log;
 mod new_agent;
@@ -35,7 +36,7 @@ pub(crate) struct Step {
 }
 
 /// In the order in which mistakes are cheapest to find.
-pub(crate) const ALL: [Step; 11] = [
+pub(crate) const ALL: [Step; 12] = [
     Step {
         name: "format",
         shows: "every file is as rustfmt writes it",
@@ -65,6 +66,12 @@ pub(crate) const ALL: [Step; 11] = [
         shows: "rings and memory under every order of events",
         needs: &[Need::Compiler],
         run: cargo::loom,
+    },
+    Step {
+        name: "fuzz",
+        shows: "whatever parses, fed with what nobody wrote",
+        needs: &[Need::Compiler, Need::CppCompiler],
+        run: fuzz::run,
     },
     Step {
         name: "docs",

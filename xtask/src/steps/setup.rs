@@ -12,6 +12,8 @@ use crate::tool::Tool;
 pub(crate) enum Need {
     /// A C compiler; it links, and builds the compressor of the logs.
     Compiler,
+    /// A C++ compiler; the fuzzer itself is written in it.
+    CppCompiler,
     Rustfmt,
     Clippy,
     /// Python 3 that can make a virtual environment.
@@ -25,6 +27,7 @@ impl Need {
         let works = |program: &str, args: &[&str]| Tool::new(program, Path::new(".")).args(args).works();
         match self {
             Need::Compiler => works("cc", &["--version"]),
+            Need::CppCompiler => works("c++", &["--version"]),
             Need::Rustfmt => Tool::cargo(Path::new(".")).args(["fmt", "--version"]).works(),
             Need::Clippy => Tool::cargo(Path::new(".")).args(["clippy", "--version"]).works(),
             Need::PythonVenv => works("python3", &["-c", "import ensurepip, venv"]),
@@ -39,6 +42,7 @@ impl Need {
     fn source(self) -> (&'static str, Source) {
         match self {
             Need::Compiler => ("a C compiler", Source::Debian(&["gcc", "libc6-dev"])),
+            Need::CppCompiler => ("a C++ compiler", Source::Debian(&["g++"])),
             Need::Rustfmt => ("rustfmt", Source::Rustup("rustfmt")),
             Need::Clippy => ("clippy", Source::Rustup("clippy")),
             Need::PythonVenv => ("python3 with venv", Source::Debian(&["python3", "python3-venv"])),
