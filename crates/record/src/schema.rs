@@ -1,7 +1,7 @@
 //! The form of a message as its definition gives it: read from the text of a `.msg` file or taken from a [`Definition`].
 
 use std::cell::Cell;
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 use types::definition::{self, Definition};
 
@@ -89,6 +89,9 @@ pub enum ParseError {
         "the definition has more than {MOST_FIELDS} fields, those of all its parts counted each time they are used"
     )]
     TooLarge,
+    /// Two fields of a message have one name, so one of them could not be told.
+    #[error("two fields of a message are called \"{0}\"")]
+    Twice(String),
     /// The encoding of wide strings is not supported, because programs do not agree about it.
     #[error("the field \"{0}\" is a wstring, which is not supported")]
     WideString(String),
@@ -135,6 +138,7 @@ impl Parts<'_> {
         let lines = self.parts.get(name).ok_or_else(|| ParseError::NoSuchType(name.to_owned()))?;
         inside.push(name.to_owned());
         let mut schema = Schema { name: name.to_owned(), fields: Vec::new(), constants: Vec::new() };
+        let mut taken = BTreeSet::new();
         for (line, text) in lines {
             self.fields.set(self.fields.get() + 1);
             if self.fields.get() > MOST_FIELDS || inside.len() > 64 {
@@ -157,6 +161,9 @@ impl Parts<'_> {
                 .next()
                 .filter(|field| is_identifier(field))
                 .ok_or_else(wrong)?;
+            if !taken.insert(field) {
+                return Err(ParseError::Twice(field.to_owned()));
+            }
             schema.fields.push(Field { name: field.to_owned(), kind: self.kind(of, name, field, inside)? });
         }
         inside.pop();
@@ -326,6 +333,7 @@ mod tests {
         let parse = |text: &str| Schema::parse("a/msg/A", text).unwrap_err();
         assert_eq!(parse("int32\n"), ParseError::NoField { line: 1, text: "int32".into() });
         assert_eq!(parse("Nowhere x\n"), ParseError::NoSuchType("a/msg/Nowhere".into()));
+        assert_eq!(parse("bool on\nint8 on\n"), ParseError::Twice("on".into()));
         assert_eq!(parse("A again\n"), ParseError::Endless("a/msg/A".into()));
         assert_eq!(parse("wstring x\n"), ParseError::WideString("x".into()));
         assert_eq!(parse("int32[2][2] x\n"), ParseError::NoSuchType("int32[2][2]".into()));
