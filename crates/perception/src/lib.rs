@@ -19,11 +19,11 @@ pub mod blobs;
 pub mod colour;
 pub mod edges;
 pub mod laser;
+mod lead;
 pub mod local_map;
 pub mod motion;
 pub mod picture;
 pub mod sonar;
-mod lead;
 mod split;
 pub mod target;
 

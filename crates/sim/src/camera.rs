@@ -227,6 +227,18 @@ pub struct Canvas {
 }
 
 impl Simulator {
+    /// The memory for all pictures of a robot.
+    pub fn canvas(&self, id: RobotId) -> Canvas {
+        let rows = self.robots[id.index()].model.camera.as_ref().map_or(0, |camera| camera.height as usize);
+        // Who carries something is two of them.
+        let sprites = 2 * self.people.len() + self.robots.len() + self.plan.things.len();
+        Canvas {
+            background: Vec::with_capacity(rows),
+            tile: Vec::with_capacity(TILE * rows),
+            sprites: Vec::with_capacity(sprites),
+        }
+    }
+
     /// Takes the picture of a robot's camera: red, green and blue bytes, row by row from the top.
     ///
     /// Gives its width and height; nothing when the robot has no camera or `image` is not width × height × 3 bytes long. The

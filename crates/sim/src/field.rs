@@ -13,6 +13,9 @@ const CELL: f64 = 0.5;
 /// Free room around everything (m), so that a robot that left a world without walls is still in the grid.
 const MARGIN: f64 = 2.0;
 
+/// So many bodies find place in one cell beforehand; more have no room in it unless they stand on one another.
+const CROWD: usize = 8;
+
 const HAS_STATIC: u8 = 1;
 const HAS_BODY: u8 = 2;
 
@@ -272,6 +275,10 @@ impl Field {
         let block = self.block_around(body.circle.centre, body.circle.radius);
         self.bodies.push(body);
         self.blocks.push(block);
+        if self.bodies.len() <= CROWD {
+            // A body that comes into a cell later finds its place there, without new memory.
+            self.bodies_in.iter_mut().for_each(|bodies| bodies.reserve(id as usize + 1));
+        }
         self.enter(id, block);
         id
     }

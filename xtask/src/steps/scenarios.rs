@@ -25,7 +25,25 @@ pub(super) fn run(workspace: &Workspace) -> Result<Done, Failure> {
         let met = judge(&document).map_err(|what| Failure::new(format!("{name}: {what}"), remedy(name)))?;
         seen.push(format!("{name} {met} of {SEEDS}"));
     }
+    let out = workspace.fresh_scratch("logged")?;
+    let words = ["run", SCENARIOS[0], "--json", "--out"];
+    let logged = Tool::new(&program, &workspace.root).args(words).arg(&out);
+    let logged = sinew::document(logged, &remedy(SCENARIOS[0]))?;
+    takes_no_memory(&logged).map_err(|what| Failure::new(what, remedy(SCENARIOS[0])))?;
+    seen.push("no memory taken in real time".to_owned());
     Ok(Done::Passed(seen.join(", ")))
+}
+
+/// No step of a real-time agent, nor its executor, may take or free memory.
+fn takes_no_memory(run: &Value) -> Result<(), String> {
+    match run["allocations"]["real_time"].as_u64() {
+        Some(0) => Ok(()),
+        Some(_) => {
+            let by = &run["allocations"]["by"];
+            Err(format!("seed {}: memory taken or freed in real time by {by}", run["seed"]))
+        }
+        None => Err(format!("seed {}: no \"allocations\" in the document", run["seed"])),
+    }
 }
 
 fn remedy(name: &str) -> String {
@@ -42,6 +60,7 @@ fn judge(document: &Value) -> Result<usize, String> {
         return Err(format!("{} runs instead of {SEEDS}", runs.len()));
     }
     for run in runs {
+        takes_no_memory(run)?;
         match run["collisions"].as_u64() {
             Some(0) => {}
             Some(count) => return Err(format!("seed {}: {count} collisions", run["seed"])),
@@ -69,7 +88,12 @@ mod tests {
     use serde_json::json;
 
     fn document(missed: usize, collisions: u64) -> Value {
-        let run = |seed: usize| json!({"seed": seed, "goal": {"met": seed > missed, "why": "stuck"}, "collisions": collisions});
+        let run = |seed: usize| {
+            json!({
+                "seed": seed, "goal": {"met": seed > missed, "why": "stuck"}, "collisions": collisions,
+                "allocations": {"real_time": 0, "by": {}},
+            })
+        };
         json!({"runs": (1..=SEEDS).map(run).collect::<Vec<_>>()})
     }
 
@@ -79,6 +103,15 @@ mod tests {
         assert_eq!(judge(&document(SEEDS - ENOUGH, 0)), Ok(ENOUGH));
         let refused = judge(&document(SEEDS - ENOUGH + 1, 0)).unwrap_err();
         assert!(refused.contains(" of 10 reached the goal\nseed 1: stuck\nseed 2"), "{refused}");
+    }
+
+    #[test]
+    fn who_takes_memory_in_real_time_is_named() {
+        let mut greedy = document(0, 0);
+        greedy["runs"][3]["allocations"] = json!({"real_time": 2, "by": {"wall": 2}});
+        assert!(judge(&greedy).unwrap_err().contains("{\"wall\":2}"));
+        greedy["runs"][3]["allocations"] = Value::Null;
+        assert!(judge(&greedy).unwrap_err().contains("no \"allocations\""), "nobody watched");
     }
 
     #[test]

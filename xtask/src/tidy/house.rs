@@ -16,7 +16,8 @@ const LESSON_LINES: usize = 100;
 pub(crate) const LONG: &[(&str, &str)] = &[];
 
 /// Written by a program or taken over from elsewhere.
-const NOT_OURS: [&str; 4] = ["Cargo.lock", "benches/peers/Cargo.lock", "fuzz/Cargo.lock", "crates/record/font/"];
+const NOT_OURS: [&str; 4] =
+    ["Cargo.lock", "benches/peers/Cargo.lock", "fuzz/Cargo.lock", "crates/record/font/"];
 
 /// Words that mark unfinished work. They are put together here, so that this file does not hold them.
 const UNFINISHED: [&str; 4] =

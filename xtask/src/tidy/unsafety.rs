@@ -10,11 +10,13 @@ use super::tree::Tree;
 pub(crate) const ALLOWED: &[(&str, &str)] = &[
     ("benches/peers/src/machine.rs", "a call of the operating system"),
     ("crates/hardware/src/latch/page.rs", "the latch is a word in a mapped file"),
+    ("crates/runtime/src/allocations.rs", "an allocator in front of another"),
     ("crates/runtime/src/context.rs", "what a thread owns is reached through a pointer to it"),
     (
         "crates/runtime/src/executor.rs",
         "a step runs while another thread may take over the rest of its executor",
     ),
+    ("crates/runtime/src/handover.rs", "the model uses an executor as the real threads do"),
     ("crates/runtime/src/log.rs", "messages are written down by their type's function"),
     ("crates/runtime/src/memory.rs", "slots are shared by pins"),
     ("crates/runtime/src/message_type.rs", "a message whose type is known at run time only"),

@@ -77,14 +77,13 @@ pub fn raise(plan: &WorldPlan, seed: u64, robots: &[Robot]) -> Result<(Vec<Simul
         }
     }
     let (world, truth) = World::new(plan, seed, robots)?;
-    let ids: Vec<RobotId> = world.ids().collect();
+    let canvases: Vec<(RobotId, Canvas)> = world.ids().map(|id| (id, world.canvas(id))).collect();
     let world = Arc::new(Mutex::new(world));
-    let drivers = ids
+    let drivers = canvases
         .into_iter()
         .zip(robots)
-        .map(|(id, robot)| Simulated::new(world.clone(), id, &robot.model))
-        .collect();
-    Ok((drivers, truth))
+        .map(|((id, canvas), robot)| Simulated::new(world.clone(), id, canvas, &robot.model));
+    Ok((drivers.collect(), truth))
 }
 
 /// What a robot of this model is to its gate.
@@ -181,7 +180,7 @@ pub struct Simulated {
 }
 
 impl Simulated {
-    fn new(world: Arc<Mutex<World>>, id: RobotId, model: &Model) -> Simulated {
+    fn new(world: Arc<Mutex<World>>, id: RobotId, canvas: Canvas, model: &Model) -> Simulated {
         let description = describe(model);
         let periods = description.periods;
         Simulated {
@@ -201,7 +200,7 @@ impl Simulated {
             echoes: empty_ring(model),
             scan: empty_scan(model),
             image: empty_image(model),
-            canvas: Canvas::default(),
+            canvas,
             wheels: WheelTicks {
                 ticks_per_turn: model.drive.ticks_per_turn,
                 wheel_radius: model.drive.wheel_radius,

@@ -1,5 +1,6 @@
 //! The world that several drivers share.
 
+use sim::camera::Canvas;
 use sim::{Goal, PHYSICS_STEP, Progress, RobotId, Simulator, WorldPlan};
 use types::{Duration, Time};
 
@@ -46,6 +47,11 @@ impl World {
         }
         let (publisher, truth) = truth(&simulator, robots);
         Ok((World { simulator, seats, origin: None, slipped: Duration::ZERO, publisher }, truth))
+    }
+
+    /// The memory for the pictures of a robot.
+    pub(super) fn canvas(&self, id: RobotId) -> Canvas {
+        self.simulator.canvas(id)
     }
 
     pub(super) fn ids(&self) -> impl Iterator<Item = RobotId> + use<> {

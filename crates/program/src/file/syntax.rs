@@ -238,8 +238,8 @@ mod tests {
 
     #[test]
     fn a_mistake_with_nothing_before_it_has_a_place() {
-        let ranges: Vec<_> = mistakes("]").into_iter().map(|(range, _)| range).collect();
-        assert_eq!(ranges, [0..1]);
+        let places: Vec<_> = mistakes("]").iter().map(|(range, _)| (range.start, range.end)).collect();
+        assert_eq!(places, [(0, 1)]);
     }
 
     #[test]
