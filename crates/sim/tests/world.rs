@@ -781,7 +781,7 @@ fn all_mistakes_of_a_world_are_told_at_once() {
 }
 
 /// What is said of a world, with the text of the place where it stands.
-fn said_of<'a>(world: &'a str, find: impl Fn(&Table) -> Span) -> (Vec<types::value::Mistake>, Span, &'a str) {
+fn said_of(world: &str, find: impl Fn(&Table) -> Span) -> (Vec<types::value::Mistake>, Span, &str) {
     let mut table = common::table(world);
     common::number_places(&mut table);
     let mut mistakes = Vec::new();
