@@ -6,6 +6,8 @@
 
 #![allow(unsafe_code)]
 
+mod change;
+
 use std::any::Any;
 use std::cmp::Reverse;
 use std::collections::BinaryHeap;
@@ -14,16 +16,20 @@ use std::sync::Arc;
 
 use types::{AgentId, Duration, Name, Time};
 
+pub(crate) use change::{Answer, Change, Link, heaps_for};
+
 use crate::agent::{Body, Fault, Step};
 use crate::allocations;
 use crate::context::{Context, ReadySet};
 use crate::door::{CHANGES, Door};
+use crate::handover::Running;
 use crate::os;
-use crate::port::{Envelope, InputEnd, OutputEnd, WireId};
+use crate::port::InputEnd;
 use crate::processor::{Checks, Reading, Stopwatch, agrees};
 use crate::ring::{self, ring};
 use crate::stats::{AgentStats, bump, bump_by, nanos};
-use crate::sync::{AtomicU32, AtomicU64, Ordering, light_barrier, named};
+use crate::sync::{Ordering, light_barrier};
+use crate::turn::Turn;
 
 /// When an agent runs.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -100,145 +106,6 @@ pub(crate) enum RawCause {
     Hang,
 }
 
-/// A change, prepared on the control side. It comes back as an answer, with what is to be freed in it.
-pub(crate) enum Change {
-    Seat {
-        slot: u32,
-        seat: Option<Box<Seat>>,
-        seats: Vec<Option<Box<Seat>>>,
-        room: usize,
-    },
-    Unseat {
-        slot: u32,
-        seat: Option<Box<Seat>>,
-    },
-    Order {
-        order: Vec<u32>,
-        ranks: Vec<u32>,
-        words: Vec<u64>,
-        releases: Releases,
-        due: Due,
-    },
-    Join {
-        end: Arc<dyn InputEnd>,
-        lanes: Box<dyn Any + Send>,
-        slot: u32,
-    },
-    Leave {
-        end: Arc<dyn InputEnd>,
-        wire: WireId,
-        into: Box<dyn Any + Send>,
-        force: bool,
-    },
-    Route {
-        end: Arc<dyn OutputEnd>,
-        route: Box<dyn Any + Send>,
-    },
-    Forget {
-        end: Arc<dyn OutputEnd>,
-        wire: WireId,
-        into: Box<dyn Any + Send>,
-    },
-    Body {
-        slot: u32,
-        body: Option<Box<dyn Body>>,
-    },
-    Params {
-        slot: u32,
-        params: Box<dyn Any + Send>,
-    },
-    Timing {
-        slot: u32,
-        timing: Timing,
-    },
-    Fault {
-        slot: u32,
-        fault: StepFault,
-    },
-    /// Makes an output misbehave, or behave again.
-    OutputFault {
-        end: Arc<dyn OutputEnd>,
-        faulty: Box<dyn Any + Send>,
-    },
-    /// Sends a message that comes from outside, on the thread that owns the routes.
-    Send {
-        end: Arc<dyn OutputEnd>,
-        message: Box<dyn Any + Send>,
-        envelope: Envelope,
-    },
-    /// Ends all agents.
-    Stop,
-}
-
-type Releases = BinaryHeap<Reverse<(Time, u32)>>;
-type Due = BinaryHeap<Reverse<(Time, u32, u32, Time)>>;
-
-/// Room in the heaps of an executor of this many agents, for [`Change::Order`].
-pub(crate) fn heaps_for(agents: usize) -> (Releases, Due) {
-    (BinaryHeap::with_capacity(agents * 3 + SPARE_ALARMS), BinaryHeap::with_capacity(agents + SPARE_ALARMS))
-}
-
-/// What an executor tells the control side.
-pub(crate) enum Answer {
-    Done(Change),
-    NotDrained(Change),
-    Died { slot: u32, id: AgentId, time: Time, cause: RawCause, body: Option<Box<dyn Body>> },
-}
-
-/// What the watchdog sees of an executor: which agent is in a step, and since when.
-#[derive(Debug, Default)]
-pub(crate) struct Running {
-    /// How many steps there were, and in the lower half the slot of the agent that is in one, plus one; zero there between steps.
-    step: AtomicU64,
-    /// The number of the agent.
-    pub agent: AtomicU32,
-    /// When the step began, in [`os::ticks`].
-    pub since: AtomicU64,
-    /// After how long it is taken for one that does not return (ns).
-    pub limit: AtomicU64,
-    /// How often the executor itself took or freed memory, between and around the steps of its agents.
-    pub allocations: core::sync::atomic::AtomicU64,
-}
-
-/// A step of an agent: no other one is equal.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) struct InStep(u64);
-
-impl InStep {
-    /// Whose step it is.
-    pub(crate) fn slot(self) -> u32 {
-        self.0 as u32 - 1
-    }
-}
-
-impl Running {
-    /// A step begins. Only the thread that has the core may say so.
-    #[inline]
-    pub(crate) fn begin(&self, slot: u32) {
-        let count = (self.step.load(Ordering::Relaxed) >> 32) + 1;
-        // Release: who gives this step up has seen what was done before it. Pairs with the barrier in `Owner::take_from`.
-        let ordering = named("hand-over: step begins", Ordering::Release);
-        self.step.store(count << 32 | u64::from(slot + 1), ordering);
-    }
-
-    /// It ended.
-    #[inline]
-    pub(crate) fn end(&self) {
-        self.step.store(self.step.load(Ordering::Relaxed) >> 32 << 32, Ordering::Relaxed);
-    }
-
-    /// The step that is going on. Says nothing of what was done before it: who needs that makes a barrier.
-    pub(crate) fn in_step(&self) -> Option<InStep> {
-        let word = self.step.load(Ordering::Relaxed);
-        (word as u32 != 0).then_some(InStep(word))
-    }
-
-    /// Whether it is still going on.
-    pub(crate) fn is_still_in(&self, step: InStep) -> bool {
-        self.step.load(Ordering::Relaxed) == step.0
-    }
-}
-
 /// The time of a step.
 struct Spent {
     /// From its beginning to its end, in [`os::ticks`].
@@ -260,6 +127,9 @@ pub(crate) struct Job {
     pub deadline: Time,
 }
 
+type Releases = BinaryHeap<Reverse<(Time, u32)>>;
+type Due = BinaryHeap<Reverse<(Time, u32, u32, Time)>>;
+
 /// The agents of one executor and what is due among them.
 pub(crate) struct Core {
     pub number: u32,
@@ -271,36 +141,13 @@ pub(crate) struct Core {
     cursor: u32,
     pub door: Arc<Door>,
     pub running: Arc<Running>,
-    changes: ring::Receiver<Option<Change>>,
+    changes: ring::Receiver<Option<(u64, Change)>>,
+    turn: Arc<Turn>,
     answers: ring::Sender<Option<Answer>>,
     nanos_per_tick: f64,
     checks: Checks,
     /// How many stalls the witness had seen after the last step.
     stalls: u64,
-}
-
-/// The control side's ends of an executor.
-pub(crate) struct Link {
-    changes: ring::Sender<Option<Change>>,
-    answers: ring::Receiver<Option<Answer>>,
-    pub door: Arc<Door>,
-    pub running: Arc<Running>,
-}
-
-impl Link {
-    /// Gives a change to the executor, unless too many are under way.
-    pub(crate) fn change(&mut self, change: Change) -> bool {
-        let has_room = self.changes.has_room();
-        if has_room {
-            self.changes.push(|slot| *slot = Some(change));
-        }
-        has_room
-    }
-
-    /// The next answer.
-    pub(crate) fn answer(&mut self) -> Option<Answer> {
-        if self.answers.advance() { self.answers.current_mut().take() } else { None }
-    }
 }
 
 /// How many changes or answers can be under way.
@@ -324,6 +171,7 @@ impl Core {
         let (answers, answer_out) = ring(UNDER_WAY, false);
         let door = Arc::new(Door::new());
         let running = Arc::new(Running::default());
+        let turn = Arc::new(Turn::default());
         let core = Core {
             number,
             seats: Vec::new(),
@@ -335,12 +183,13 @@ impl Core {
             door: door.clone(),
             running: running.clone(),
             changes,
+            turn: turn.clone(),
             answers,
             nanos_per_tick: os::nanos_per_tick(),
             checks: Checks::default(),
             stalls: 0,
         };
-        (core, Link { changes: change_in, answers: answer_out, door, running })
+        (core, Link { changes: change_in, answers: answer_out, turn, given: 0, door, running })
     }
 
     /// When the next agent is due by the clock.
@@ -653,175 +502,5 @@ impl Core {
         let died =
             Answer::Died { slot, id: seat.id, time: now, cause: RawCause::Hang, body: seat.body.take() };
         self.answer(died);
-    }
-
-    /// Tells the control side. There is room: changes are served only while there is, and one agent dies once before the
-    /// control side has taken the news and given it a successor.
-    fn answer(&mut self, answer: Answer) {
-        if self.answers.has_room() {
-            self.answers.push(|slot| *slot = Some(answer));
-        } else {
-            // Memory is not freed on this side.
-            std::mem::forget(answer);
-        }
-    }
-
-    /// Commits the changes that wait. Each goes back to the control side, to be freed there.
-    pub(crate) fn serve_changes(&mut self, context: &Context, now: Time) {
-        while self.answers.has_room() && self.changes.advance() {
-            let Some(mut change) = self.changes.current_mut().take() else { return };
-            let before = allocations::so_far();
-            let done = self.commit(&mut change, context, now);
-            // An agent that is stopped may free what it likes.
-            if !matches!(change, Change::Stop | Change::Unseat { .. }) {
-                self.note_allocations(allocations::so_far() - before);
-            }
-            self.answer(if done { Answer::Done(change) } else { Answer::NotDrained(change) });
-        }
-    }
-
-    #[inline]
-    fn note_allocations(&self, count: u64) {
-        if count > 0 {
-            bump_by(&self.running.allocations, count);
-        }
-    }
-
-    /// Says whether it is done; a wire that still has messages is not cut yet.
-    fn commit(&mut self, change: &mut Change, context: &Context, now: Time) -> bool {
-        match change {
-            Change::Seat { slot, seat, seats, room } => {
-                if self.seats.capacity() < *room {
-                    seats.append(&mut self.seats);
-                    core::mem::swap(&mut self.seats, seats);
-                }
-                if self.seats.len() <= *slot as usize {
-                    self.seats.resize_with(*slot as usize + 1, || None);
-                }
-                if let Some(mut new) = seat.take() {
-                    if new.timing.period > Duration::ZERO {
-                        new.next_release = now;
-                        self.push_release(now, *slot);
-                    }
-                    *seat = self.seats[*slot as usize].replace(new);
-                }
-            }
-            Change::Unseat { slot, seat } => {
-                *seat = self.seats.get_mut(*slot as usize).and_then(Option::take);
-                if let Some(seat) = seat {
-                    self.stop_agent(seat, context, now);
-                }
-                self.due.retain(|Reverse((_, _, known, _))| *known != *slot);
-            }
-            Change::Order { order, ranks, words, releases, due } => {
-                self.reorder(order, ranks, words);
-                if releases.capacity() > self.releases.capacity() {
-                    releases.append(&mut self.releases);
-                    core::mem::swap(releases, &mut self.releases);
-                }
-                if due.capacity() > self.due.capacity() {
-                    due.append(&mut self.due);
-                    core::mem::swap(due, &mut self.due);
-                }
-            }
-            Change::Join { end, lanes, slot } => {
-                end.join(lanes.as_mut());
-                let _ = slot;
-            }
-            Change::Leave { end, wire, into, force } => {
-                if !*force && !end.is_drained(*wire) {
-                    return false;
-                }
-                end.leave(*wire, into.as_mut());
-            }
-            Change::Route { end, route } => end.add_route(route.as_mut()),
-            Change::Forget { end, wire, into } => end.forget(*wire, into.as_mut()),
-            Change::Body { slot, body } => {
-                if let Some(seat) = self.seats.get_mut(*slot as usize).and_then(Option::as_mut) {
-                    core::mem::swap(&mut seat.body, body);
-                    seat.started = false;
-                    if seat.on.iter().any(|input| input.has_message()) {
-                        self.ready.mark(*slot);
-                    }
-                }
-            }
-            Change::Params { slot, params } => {
-                let seat = self.seats.get_mut(*slot as usize).and_then(Option::as_mut);
-                if let Some(body) = seat.and_then(|seat| seat.body.as_mut()) {
-                    body.swap_params(params.as_mut());
-                }
-            }
-            Change::Timing { slot, timing } => {
-                if let Some(seat) = self.seats.get_mut(*slot as usize).and_then(Option::as_mut) {
-                    // A longer period holds at once, a shorter one from the next release on.
-                    let next = if timing.period <= Duration::ZERO {
-                        Time::NEVER
-                    } else if seat.next_release == Time::NEVER {
-                        now
-                    } else if timing.period > seat.timing.period {
-                        seat.next_release - seat.timing.period + timing.period
-                    } else {
-                        seat.next_release
-                    };
-                    seat.timing = *timing;
-                    seat.next_release = next;
-                    if seat.put_off < Time::NEVER {
-                        // Whether it still has to wait is seen when it is looked at next.
-                        seat.put_off = Time::NEVER;
-                        self.ready.mark(*slot);
-                    }
-                    if next < Time::NEVER {
-                        self.push_release(next, *slot);
-                    }
-                }
-            }
-            Change::Fault { slot, fault } => {
-                if let Some(seat) = self.seats.get_mut(*slot as usize).and_then(Option::as_mut) {
-                    seat.fault = *fault;
-                }
-            }
-            Change::OutputFault { end, faulty } => end.set_fault(faulty.as_mut()),
-            Change::Send { end, message, envelope } => {
-                context.begin(AgentId::NONE, now, self.number, &*self.ready);
-                end.send_prepared(envelope, message.as_ref());
-                context.end();
-            }
-            Change::Stop => {
-                let mut seats = core::mem::take(&mut self.seats);
-                for seat in seats.iter_mut().flatten() {
-                    self.stop_agent(seat, context, now);
-                }
-                self.seats = seats;
-            }
-        }
-        true
-    }
-
-    fn stop_agent(&self, seat: &mut Seat, context: &Context, now: Time) {
-        let Some(body) = seat.body.as_mut() else { return };
-        if !seat.started {
-            return;
-        }
-        context.begin(seat.id, now, self.number, &*self.ready);
-        let mut step = Step { now, deadline: now, agent: seat.id, period: seat.timing.period };
-        let stopped = catch_unwind(AssertUnwindSafe(|| body.stop(&mut step)));
-        context.end();
-        if stopped.is_err() {
-            bump(&seat.stats.panics);
-        }
-    }
-
-    fn reorder(&mut self, order: &mut Vec<u32>, ranks: &mut Vec<u32>, words: &mut Vec<u64>) {
-        let mut from = 0;
-        while let Some(rank) = self.ready.next(from) {
-            from = rank + 1;
-            let slot = self.order[rank as usize];
-            if let Some(new) = ranks.get(slot as usize).copied().filter(|rank| *rank != u32::MAX) {
-                words[new as usize / 64] |= 1 << (new % 64);
-            }
-        }
-        core::mem::swap(&mut self.order, order);
-        self.ready.set_order(ranks, words);
-        self.cursor = 0;
     }
 }

@@ -13,8 +13,61 @@
 //!   m ◄──────────────── the spare thread m claims it ─────  FREE
 //! ```
 
-use crate::executor::{InStep, Running};
-use crate::sync::{AtomicU32, Ordering, heavy_barrier, named};
+use crate::sync::{AtomicU32, AtomicU64, Ordering, heavy_barrier, named};
+
+/// What the watchdog sees of an executor: which agent is in a step, and since when.
+#[derive(Debug, Default)]
+pub(crate) struct Running {
+    /// How many steps there were, and in the lower half the slot of the agent that is in one, plus one; zero there between steps.
+    step: AtomicU64,
+    /// The number of the agent.
+    pub agent: AtomicU32,
+    /// When the step began, in [`os::ticks`].
+    pub since: AtomicU64,
+    /// After how long it is taken for one that does not return (ns).
+    pub limit: AtomicU64,
+    /// How often the executor itself took or freed memory, between and around the steps of its agents.
+    pub allocations: core::sync::atomic::AtomicU64,
+}
+
+/// A step of an agent: no other one is equal.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) struct InStep(u64);
+
+impl InStep {
+    /// Whose step it is.
+    pub(crate) fn slot(self) -> u32 {
+        self.0 as u32 - 1
+    }
+}
+
+impl Running {
+    /// A step begins. Only the thread that has the core may say so.
+    #[inline]
+    pub(crate) fn begin(&self, slot: u32) {
+        let count = (self.step.load(Ordering::Relaxed) >> 32) + 1;
+        // Release: who gives this step up has seen what was done before it. Pairs with the barrier in `Owner::take_from`.
+        let ordering = named("hand-over: step begins", Ordering::Release);
+        self.step.store(count << 32 | u64::from(slot + 1), ordering);
+    }
+
+    /// It ended.
+    #[inline]
+    pub(crate) fn end(&self) {
+        self.step.store(self.step.load(Ordering::Relaxed) >> 32 << 32, Ordering::Relaxed);
+    }
+
+    /// The step that is going on. Says nothing of what was done before it: who needs that makes a barrier.
+    pub(crate) fn in_step(&self) -> Option<InStep> {
+        let word = self.step.load(Ordering::Relaxed);
+        (word as u32 != 0).then_some(InStep(word))
+    }
+
+    /// Whether it is still going on.
+    pub(crate) fn is_still_in(&self, step: InStep) -> bool {
+        self.step.load(Ordering::Relaxed) == step.0
+    }
+}
 
 /// Stands beside the number of a thread that the watchdog is about to give up.
 const MARK: u32 = 1 << 31;

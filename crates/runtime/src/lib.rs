@@ -76,6 +76,7 @@ mod sync;
 mod system;
 mod tap;
 mod trace;
+mod turn;
 mod wall;
 mod witness;
 

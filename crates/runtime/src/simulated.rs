@@ -12,7 +12,8 @@ use types::{Duration, Time};
 
 use crate::agent::Registry;
 use crate::context::{Context, install_panic_hook};
-use crate::executor::{Core, Ended, Running};
+use crate::executor::{Core, Ended};
+use crate::handover::Running;
 use crate::log::LogThread;
 use crate::os;
 use crate::plan::Plan;

@@ -202,7 +202,7 @@ impl Router {
             let _ = self.commit(executor, Change::Forget { end, wire: under_way.answer, into }, fabric);
         }
         if let Some(end) = ends.input {
-            let _ = self.leave(executor, end, under_way.question, true, fabric);
+            self.leave(executor, end, under_way.question, true, fabric);
         }
     }
 

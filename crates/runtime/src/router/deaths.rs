@@ -108,7 +108,7 @@ impl Router {
             } else if to.0 != id
                 && let Some((executor, PortEnds { input: Some(end), .. })) = side(to.0, to.1)
             {
-                let _ = self.leave(executor, end, wire, true, fabric);
+                self.leave(executor, end, wire, true, fabric);
             }
         }
         self.wires.retain(|wire| wire.from.0 != id && wire.to.0 != id);

@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use types::{AgentId, Filter, Priority};
 
-use super::{Fabric, Reply, Router, Wire};
+use super::{Committed, Fabric, Leaving, Reply, Router, Wire};
 use crate::executor::Change;
 use crate::plan::{USUAL_DEPTH, USUAL_DEPTH_ON, WirePlan};
 use crate::port::{Direction, InputEnd, NoSeat, PortEnds, Target, WireCounts, WireId, WireSpec};
@@ -140,8 +140,13 @@ impl Router {
             Refusal::new(format!("{} has readers on all {seats} seats of its memory", plan.from))
         })?;
         let (sender_executor, receiver_executor, slot) = (sender.executor, receiver.executor, receiver.slot);
+        let joined = input.clone();
         self.commit(receiver_executor, Change::Join { end: input, lanes: prepared.lanes, slot }, fabric)?;
-        self.commit(sender_executor, Change::Route { end: output, route: prepared.route }, fabric)?;
+        let route = Change::Route { end: output, route: prepared.route };
+        self.commit(sender_executor, route, fabric).inspect_err(|_| {
+            // Nobody has sent anything: the receiver leaves again.
+            self.leave(receiver_executor, joined, id, true, fabric);
+        })?;
         self.wires.push(Wire {
             id,
             from: from_id,
@@ -208,12 +213,14 @@ impl Router {
         let end =
             |id: AgentId, port: usize| self.by_id(id).map(|known| (known.executor, known.ends[port].clone()));
         if let Some((executor, PortEnds { input: Some(end), .. })) = end(to.0, to.1) {
-            self.leave(executor, end, id, force, fabric)?;
+            self.leave(executor, end, id, force, fabric);
         }
         self.wires.retain(|wire| wire.id != id);
         Ok(())
     }
 
+    /// Takes the lanes of a wire out of a mailbox, when it is drained unless that is not waited for. An executor that does not answer does it
+    /// when it does: nobody sends on that wire any more.
     pub(super) fn leave(
         &mut self,
         executor: usize,
@@ -221,18 +228,32 @@ impl Router {
         wire: WireId,
         force: bool,
         fabric: &mut dyn Fabric,
-    ) -> Reply<()> {
-        // A receiver that takes nothing any more is not waited for: what lies in its mailbox is counted as dropped.
+    ) {
+        // A receiver that takes nothing any more is not waited for: what lies in its mailbox is lost with it.
         const PATIENCE: usize = 100;
-        for attempt in 0.. {
-            let into = end.leaving_box();
-            let change = Change::Leave { end: end.clone(), wire, into, force: force || attempt >= PATIENCE };
-            if self.commit_and_get(executor, change, fabric).is_ok_and(
-                |change| matches!(change, Change::Leave { force, .. } if force || attempt < PATIENCE),
-            ) {
-                return Ok(());
+        for attempt in 0..=PATIENCE {
+            let (into, force) = (end.leaving_box(), force || attempt == PATIENCE);
+            let change = Change::Leave { end: end.clone(), wire, into, force };
+            match self.commit_and_get(executor, change, fabric) {
+                Ok(Committed::Done) => return,
+                Ok(Committed::NotDrained) => {}
+                Err(_) => {
+                    self.leaving.push(Leaving { executor, end, wire });
+                    return;
+                }
             }
         }
-        Ok(())
+    }
+
+    /// An executor has answered: what it owes from the time when it did not is made up for.
+    pub(super) fn leave_late(&mut self, executor: usize, fabric: &mut dyn Fabric) {
+        while let Some(at) = self.leaving.iter().position(|leaving| leaving.executor == executor) {
+            let Leaving { end, wire, .. } = self.leaving.swap_remove(at);
+            let before = self.leaving.len();
+            self.leave(executor, end, wire, true, fabric);
+            if self.leaving.len() > before {
+                return;
+            }
+        }
     }
 }

@@ -3,7 +3,9 @@
 #![allow(clippy::unwrap_used)] // a test may
 
 mod calls;
+mod fire;
 mod memory;
+mod stuck;
 mod wall;
 
 use runtime::{

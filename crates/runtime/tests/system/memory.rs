@@ -1,6 +1,9 @@
 //! Nobody takes or frees memory in real time, whatever is asked of a running system.
 
-use core::sync::atomic::{AtomicU64, Ordering};
+#![allow(unsafe_code)] // an allocator that counts
+
+use core::sync::atomic::{AtomicI64, AtomicU64, Ordering};
+use std::alloc::{GlobalAlloc, Layout, System};
 
 use runtime::{
     Agent, Fault, FaultKind, Input, Live, LogChoice, Observer, Options, Output, Plan, Registry, Report,
@@ -12,7 +15,28 @@ use types::{Duration, Time};
 use crate::{Painter, Relay, Source, SourceParams, options};
 
 #[global_allocator]
-static MEMORY: runtime::Watched = runtime::Watched::SYSTEM;
+static MEMORY: runtime::Watched<Bytes> = runtime::Watched::new(Bytes);
+
+/// Bytes in use in this process.
+pub(crate) static BYTES: AtomicI64 = AtomicI64::new(0);
+
+/// The allocator of the system, with a count of the bytes in use.
+struct Bytes;
+
+// SAFETY: every call goes on to the allocator of the system as it came.
+unsafe impl GlobalAlloc for Bytes {
+    unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
+        BYTES.fetch_add(layout.size() as i64, Ordering::Relaxed);
+        // SAFETY: the caller's promises.
+        unsafe { System.alloc(layout) }
+    }
+
+    unsafe fn dealloc(&self, place: *mut u8, layout: Layout) {
+        BYTES.fetch_sub(layout.size() as i64, Ordering::Relaxed);
+        // SAFETY: the caller's promises.
+        unsafe { System.dealloc(place, layout) }
+    }
+}
 
 static TAKEN: AtomicU64 = AtomicU64::new(0);
 
