@@ -1,5 +1,7 @@
 //! The wall follower: along the walls, through every gap that is wide enough, and away from what it only circles.
 
+use std::any::Any;
+
 use motion::wall::Side;
 use navigation::ground::Ground;
 use navigation::roam::{Beside, Parameters, Roamer};
@@ -112,6 +114,13 @@ impl Agent for WallFollower {
         }
     }
 
+    /// What it remembers of the room, and where it was going.
+    fn take_over(&mut self, before: &mut dyn Any) {
+        if let Some(before) = before.downcast_mut::<WallFollower>() {
+            core::mem::swap(&mut self.walk, &mut before.walk);
+        }
+    }
+
     fn step(&mut self, step: &mut Step) -> Result<(), Fault> {
         if let Some(odometry) = self.odometry.latest() {
             self.walk.pose = Some(odometry.pose);
@@ -216,6 +225,7 @@ fn beside(params: &WallParams, ranges: &Ranges) -> Beside {
 mod tests {
     use super::*;
     use crate::shared::blank;
+    use runtime::Declare as _;
 
     #[test]
     fn before_a_wall_it_turns_so_that_the_wall_is_on_the_chosen_side() {
@@ -231,6 +241,20 @@ mod tests {
             walk.advance(&params, Time::ZERO).unwrap().twist.angular
         };
         assert!(turn("left") < -0.3 && turn("right") > 0.3, "{} {}", turn("left"), turn("right"));
+    }
+
+    #[test]
+    fn a_replacement_knows_the_room_that_the_one_before_has_seen() {
+        let [mut before, mut after] = [(); 2].map(|()| WallFollower::build(WallParams::default()));
+        let mut ranges = blank(12, 0.3, 6.2);
+        ranges.values.fill(1.0);
+        before.walk.pose = Some(Pose::default());
+        before.walk.hear(&before.params, &ranges, None, Time::ZERO);
+        let near = |wall: &WallFollower| wall.walk.map.around(Pose::default(), 2.0, Time::ZERO, 1).count();
+        let seen = near(&before);
+        assert!(seen > 0 && near(&after) == 0);
+        after.take_over(&mut before);
+        assert_eq!((near(&after), after.walk.heard), (seen, Some(Time::ZERO)));
     }
 
     #[test]

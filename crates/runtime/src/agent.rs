@@ -49,7 +49,35 @@ pub trait Agent: Send + 'static {
     /// Reads ports, calls an algorithm, writes ports. It may not block, and in a real-time executor it may not allocate.
     fn step(&mut self, step: &mut Step) -> Result<(), Fault>;
 
-    /// Called once after the last step of an agent that is removed or whose system ends.
+    /// Takes over what the agent in whose place it comes has learnt: called once, before `start`, when it replaces one that is alive. Who
+    /// that was, it sees by `downcast_mut`; what is moved out of it is kept, the rest is stopped and freed. Like a step it may not allocate
+    /// in a real-time executor: exchange buffers, do not copy them.
+    ///
+    /// ```
+    /// # use runtime::{Agent, Fault, Output, Step};
+    /// # use types::messages::Twist;
+    /// # use std::any::Any;
+    /// # #[derive(Agent)]
+    /// # /// A map.
+    /// # struct Mapper {
+    /// #     /// Nothing.
+    /// #     out: Output<Twist>,
+    /// #     map: Vec<u8>,
+    /// # }
+    /// # impl Agent for Mapper {
+    /// # fn step(&mut self, _: &mut Step) -> Result<(), Fault> { Ok(()) }
+    /// fn take_over(&mut self, before: &mut dyn Any) {
+    ///     if let Some(before) = before.downcast_mut::<Mapper>() {
+    ///         core::mem::swap(&mut self.map, &mut before.map);
+    ///     }
+    /// }
+    /// # }
+    /// ```
+    fn take_over(&mut self, before: &mut dyn Any) {
+        let _ = before;
+    }
+
+    /// Called once after the last step of an agent that is removed, replaced or restarted on request, or whose system ends.
     fn stop(&mut self, step: &mut Step) {
         let _ = step;
     }
@@ -159,6 +187,8 @@ pub(crate) trait Body: Send {
     fn start(&mut self, step: &mut Step) -> Result<(), Fault>;
     fn step(&mut self, step: &mut Step) -> Result<(), Fault>;
     fn stop(&mut self, step: &mut Step);
+    fn take_over(&mut self, before: &mut dyn Body);
+    fn as_any(&mut self) -> &mut dyn Any;
     fn visit_ports(&mut self, visit: &mut dyn FnMut(PortVisit<'_>));
     fn swap_params(&mut self, params: &mut (dyn Any + Send));
 }
@@ -172,6 +202,12 @@ impl<A: Declare> Body for A {
     }
     fn stop(&mut self, step: &mut Step) {
         Agent::stop(self, step);
+    }
+    fn take_over(&mut self, before: &mut dyn Body) {
+        Agent::take_over(self, before.as_any());
+    }
+    fn as_any(&mut self) -> &mut dyn Any {
+        self
     }
     fn visit_ports(&mut self, visit: &mut dyn FnMut(PortVisit<'_>)) {
         Declare::visit_ports(self, visit);

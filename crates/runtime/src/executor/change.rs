@@ -61,6 +61,8 @@ pub(crate) enum Change {
     Body {
         slot: u32,
         body: Option<Box<dyn Body>>,
+        /// Whether the new one takes over what the present one has learnt.
+        hands_over: bool,
     },
     Params {
         slot: u32,
@@ -168,7 +170,7 @@ impl Core {
             let before = allocations::so_far();
             let done = self.commit(&mut change, context, now);
             // An agent that is stopped may free what it likes.
-            if !matches!(change, Change::Stop | Change::Unseat { .. }) {
+            if !matches!(change, Change::Stop | Change::Unseat { .. } | Change::Body { .. }) {
                 self.note_allocations(allocations::so_far() - before);
             }
             self.answer(if done { Answer::Done(change) } else { Answer::NotDrained(change) });
@@ -231,15 +233,7 @@ impl Core {
             }
             Change::Route { end, route } => end.add_route(route.as_mut()),
             Change::Forget { end, wire, into } => end.forget(*wire, into.as_mut()),
-            Change::Body { slot, body } => {
-                if let Some(seat) = self.seats.get_mut(*slot as usize).and_then(Option::as_mut) {
-                    core::mem::swap(&mut seat.body, body);
-                    seat.started = false;
-                    if seat.on.iter().any(|input| input.has_message()) {
-                        self.ready.mark(*slot);
-                    }
-                }
-            }
+            Change::Body { slot, body, hands_over } => self.put_body(*slot, body, *hands_over, context, now),
             Change::Params { slot, params } => {
                 let seat = self.seats.get_mut(*slot as usize).and_then(Option::as_mut);
                 if let Some(body) = seat.and_then(|seat| seat.body.as_mut()) {
@@ -291,6 +285,39 @@ impl Core {
             }
         }
         true
+    }
+
+    /// Puts another instance in the place of the present one, which is stopped if it is alive.
+    fn put_body(
+        &mut self,
+        slot: u32,
+        body: &mut Option<Box<dyn Body>>,
+        hands_over: bool,
+        context: &Context,
+        now: Time,
+    ) {
+        let Some(mut seat) = self.seats.get_mut(slot as usize).and_then(Option::take) else { return };
+        if let (Some(new), Some(old)) = (body.as_mut(), seat.body.as_mut())
+            && hands_over
+        {
+            context.begin(seat.id, now, self.number, &*self.ready);
+            let handed = catch_unwind(AssertUnwindSafe(|| new.take_over(&mut **old)));
+            context.end();
+            if let Err(payload) = handed {
+                // The new one dies of it. The old one goes with it: what it knew may be half moved.
+                bump(&seat.stats.panics);
+                let cause = RawCause::Panic(context.panic_record(), payload);
+                self.answer(Answer::Died { slot, id: seat.id, time: now, cause, body: body.take() });
+            }
+        }
+        self.stop_agent(&mut seat, context, now);
+        core::mem::swap(&mut seat.body, body);
+        seat.started = false;
+        let has_message = seat.on.iter().any(|input| input.has_message());
+        self.seats[slot as usize] = Some(seat);
+        if has_message {
+            self.ready.mark(slot);
+        }
     }
 
     fn stop_agent(&self, seat: &mut Seat, context: &Context, now: Time) {

@@ -184,7 +184,7 @@ impl Router {
     pub(super) fn restart_now(&mut self, name: &str, fabric: &mut dyn Fabric) -> Reply<()> {
         let at = self.index(name)?;
         let body = self.agents[at].kind.build(&self.agents[at].params).map_err(first)?;
-        self.install(at, body, fabric)
+        self.install(at, body, false, fabric)
     }
 
     pub(super) fn replace(
@@ -219,7 +219,7 @@ impl Router {
         }
         let (_, table) = new.read_params(params).map_err(first)?;
         let body = new.build(params).map_err(first)?;
-        self.install(at, body, fabric)?;
+        self.install(at, body, true, fabric)?;
         let known = &mut self.agents[at];
         known.spare = new.build(params).ok();
         known.kind = new;
@@ -229,11 +229,13 @@ impl Router {
         Ok(())
     }
 
-    /// Puts a new instance in the place of the present one, in front of the same mailboxes and routes.
+    /// Puts a new instance in the place of the present one, in front of the same mailboxes and routes; on demand it takes over what
+    /// that has learnt.
     pub(super) fn install(
         &mut self,
         at: usize,
         mut body: Box<dyn Body>,
+        hands_over: bool,
         fabric: &mut dyn Fabric,
     ) -> Reply<()> {
         let known = &mut self.agents[at];
@@ -244,7 +246,7 @@ impl Router {
             }
         });
         let (executor, slot) = (known.executor, known.slot);
-        self.commit(executor, Change::Body { slot, body: Some(body) }, fabric)?;
+        self.commit(executor, Change::Body { slot, body: Some(body), hands_over }, fabric)?;
         let known = &mut self.agents[at];
         known.state = AgentState::Running;
         known.restart_at = Time::NEVER;

@@ -53,7 +53,7 @@ impl Router {
             match body {
                 Ok(body) => {
                     let name = known.plan.name.clone();
-                    match self.install(at, body, fabric) {
+                    match self.install(at, body, false, fabric) {
                         Ok(()) => self.incidents.push(Incident {
                             time: now,
                             agent: name,
@@ -129,7 +129,7 @@ impl Router {
             new.stats.restarts.store(known.stats.restarts.load(Relaxed), Relaxed);
             let (executor, slot) = (new.executor, new.slot);
             // It waits for its restart like everybody who died.
-            let _ = self.commit(executor, Change::Body { slot, body: None }, fabric);
+            let _ = self.commit(executor, Change::Body { slot, body: None, hands_over: false }, fabric);
         }
     }
 

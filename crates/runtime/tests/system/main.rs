@@ -6,6 +6,7 @@ mod calls;
 mod fire;
 mod memory;
 mod stuck;
+mod successor;
 mod wall;
 
 use runtime::{
@@ -105,6 +106,11 @@ fn parse(words: &[String]) -> Result<Request, Refusal> {
         },
         ["set", agent, key, value] => {
             Request::Set { agent: agent.into(), key: key.into(), value: runtime::value_of(value) }
+        }
+        ["replace", agent, kind, ref more @ ..] => {
+            let mut params = types::value::Table::default();
+            more.iter().for_each(|key| params.set(key, Value::from(true)));
+            Request::Replace { agent: agent.into(), kind: kind.into(), params }
         }
         ["remove", agent] => Request::Remove(agent.into()),
         ["restart", agent] => Request::Restart(agent.into()),
