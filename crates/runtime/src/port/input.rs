@@ -337,3 +337,71 @@ pub(crate) fn downcast_input<T: Message>(end: &Arc<dyn InputEnd>) -> Option<Arc<
     let any: Arc<dyn Any + Send + Sync> = end.clone();
     any.downcast().ok()
 }
+
+#[cfg(test)]
+#[cfg(loom)]
+mod model {
+    use super::*;
+    use crate::door::Door;
+    use crate::port::{Envelope, Output, Target, WireSpec};
+    use crate::ring::Overload;
+    use crate::sync::weaken;
+    use loom::thread;
+    use types::Filter;
+    use types::messages::Twist;
+
+    fn output(options: &PortOptions) -> (Output<Twist>, PortEnds) {
+        let mut output = Output::default();
+        let ends = output.create(options, 0);
+        output.bind(&ends);
+        (output, ends)
+    }
+
+    fn wire(id: u32, from: &PortEnds, to: &PortEnds, priorities: &[Priority]) {
+        let target = Target { executor: 0, slot: 0, door: Arc::new(Door::new()), wakes: false };
+        let (overload, counts) = (Overload::Refuse, Arc::default());
+        let spec = WireSpec { id: WireId(id), depth: 1, overload, filter: Filter::default(), target, counts };
+        let (from, to) = (from.output.as_ref().unwrap(), to.input.as_ref().unwrap());
+        let mut made = from.prepare(&spec, priorities, 0, 0).ok().unwrap();
+        to.join(made.lanes.as_mut());
+        from.add_route(made.route.as_mut());
+    }
+
+    /// Two agents send to a third, one of them with two priorities; what was accepted arrives once, and in the order of each lane.
+    #[test]
+    fn two_senders_fill_one_mailbox() {
+        weaken::check(&["ring: refuse, look", "ring: refuse, give back"], || {
+            let two = PortOptions { priorities: "urgent, normal", ..PortOptions::DEFAULT };
+            let ((mut one, one_end), (mut other, other_end)) = (output(&two), output(&PortOptions::DEFAULT));
+            let mut input = Input::<Twist>::default();
+            let end = input.create(&PortOptions::DEFAULT, 0);
+            input.bind(&end);
+            wire(1, &one_end, &end, &[Priority::Urgent, Priority::Normal]);
+            wire(2, &other_end, &end, &[Priority::Normal]);
+            let urgent = Envelope { priority: Priority::Urgent, ..Envelope::default() };
+            let first = thread::spawn(move || {
+                let normal = one.send(Twist::new(1.0, 1.0)).taken;
+                normal + one.send_as(urgent, Twist::new(2.0, 2.0)).taken
+            });
+            let second = thread::spawn(move || {
+                // The ring holds one: the second goes through when the receiver was there.
+                other.send(Twist::new(3.0, 3.0)).taken + other.send(Twist::new(4.0, 4.0)).taken
+            });
+            let mut taken = Vec::new();
+            let mut take = |input: &mut Input<Twist>| {
+                let received = input.take().map(|twist| (twist.linear, twist.angular));
+                taken.extend(received);
+                received.is_some()
+            };
+            take(&mut input);
+            let accepted = first.join().unwrap() + second.join().unwrap();
+            while take(&mut input) {}
+            assert!(taken.iter().all(|(linear, angular)| linear == angular), "torn: {taken:?}");
+            assert_eq!(taken.len() as u32, accepted, "what was accepted arrives once: {taken:?}");
+            let at = |number: f64| taken.iter().position(|(linear, _)| *linear == number);
+            assert!(at(4.0).is_none_or(|later| at(3.0).is_some_and(|sooner| sooner < later)), "{taken:?}");
+            // With all there at once the urgent one comes first.
+            assert!(at(2.0).is_some_and(|urgent| urgent <= 1), "{taken:?}");
+        });
+    }
+}
