@@ -149,7 +149,9 @@ mod tests {
     #[test]
     fn a_question_is_read_as_it_was_written() {
         let words = ["set", "a", "b=c d"].map(str::to_owned).to_vec();
-        for message in [None, Some(json!({"linear": {"x": 0.4}}))] {
+        // Of this number the last digit was lost on the way.
+        let long = serde_json::from_str("{\"n\": 18446748446744073709550}").unwrap();
+        for message in [None, Some(json!({"linear": {"x": 0.4}})), Some(long)] {
             let question = Question { id: json!(7), words: words.clone(), message };
             assert_eq!(Question::read(question.line().as_bytes()), Ok(question));
         }

@@ -15,9 +15,14 @@ const FLAGS: &str = "-Cpasses=sancov-module \
     -Cllvm-args=-sanitizer-coverage-pc-table \
     -Cllvm-args=-sanitizer-coverage-trace-compares";
 
-/// How long each target runs (s): enough to take every file of the corpus apart, and for the mistakes that lie on top.
-const SECONDS: u32 = 10;
-/// Changes how long each target runs.
+/// How many inputs a target gets: some seconds of them, enough to take every file of the corpus apart, and for the mistakes that lie on
+/// top. A number of inputs and not of seconds, so that every machine sees the same ones.
+const RUNS: u64 = 50_000;
+/// Those that are slower get fewer.
+const SLOW: [(&str, u64); 3] = [("log", 4_000), ("system", 500), ("world", 300)];
+/// How long a target may take for that (s).
+const AT_MOST: u32 = 120;
+/// Makes each target run for so many seconds instead.
 const LONGER: &str = "SINEW_FUZZ_SECONDS";
 /// No input may take longer (s) or need more (MB). The bounds of the parsers are lower: other work shares this machine.
 const SLOWEST: u32 = 5;
@@ -38,10 +43,18 @@ pub(super) fn run(workspace: &Workspace) -> Result<Done, Failure> {
     Ok(Done::Passed(format!("{} targets, {runs} runs", targets.len())))
 }
 
-fn seconds(said: Option<&str>) -> Result<u32, Failure> {
-    let Some(said) = said else { return Ok(SECONDS) };
+fn seconds(said: Option<&str>) -> Result<Option<u32>, Failure> {
+    let Some(said) = said else { return Ok(None) };
     let known = said.parse().ok().filter(|seconds| *seconds > 0);
-    known.ok_or_else(|| Failure::usage(format!("{LONGER} is \"{said}\""), "It is a number of seconds."))
+    known
+        .map(Some)
+        .ok_or_else(|| Failure::usage(format!("{LONGER} is \"{said}\""), "It is a number of seconds."))
+}
+
+/// How much a target gets, as it is told.
+fn amount(target: &str, seconds: Option<u32>) -> String {
+    let runs = SLOW.iter().find(|(slow, _)| *slow == target).map_or(RUNS, |(_, runs)| *runs);
+    seconds.map_or(format!("-runs={runs}"), |seconds| format!("-max_total_time={seconds}"))
 }
 
 /// The names of the targets, in order.
@@ -70,7 +83,7 @@ fn unreadable(path: &Path, error: &std::io::Error) -> Failure {
 }
 
 /// Runs one target on a copy of its corpus.
-fn feed(workspace: &Workspace, program: &Path, target: &str, seconds: u32) -> Result<Seen, Failure> {
+fn feed(workspace: &Workspace, program: &Path, target: &str, seconds: Option<u32>) -> Result<Seen, Failure> {
     let scratch = workspace.fresh_scratch(&format!("fuzz/{target}"))?;
     let (corpus, temporary) = (scratch.join("corpus"), scratch.join("temporary"));
     for folder in [&corpus, &temporary] {
@@ -87,9 +100,10 @@ fn feed(workspace: &Workspace, program: &Path, target: &str, seconds: u32) -> Re
     // The same seed always: a change is judged by what it changes. Longer runs draw their own.
     // A target that is stopped in the middle of an allocation may hang in its own last words: then it is killed.
     let mut tool = Tool::new("timeout", &scratch).env("TMPDIR", &temporary);
-    tool = tool.args(["--kill-after=5s".to_owned(), format!("{}s", seconds + 60)]).arg(program).args([
+    let limit = seconds.map_or(AT_MOST, |seconds| seconds + 60);
+    tool = tool.args(["--kill-after=5s".to_owned(), format!("{limit}s")]).arg(program).args([
         "-seed=1".to_owned(),
-        format!("-max_total_time={seconds}"),
+        amount(target, seconds),
         format!("-timeout={SLOWEST}"),
         format!("-rss_limit_mb={MOST_MEMORY}"),
         format!("-artifact_prefix={}/", found.display()),
@@ -156,7 +170,11 @@ mod tests {
 
     #[test]
     fn a_time_is_a_number_of_seconds() {
-        assert_eq!((seconds(None).unwrap(), seconds(Some("300")).unwrap()), (SECONDS, 300));
+        assert_eq!((seconds(None).unwrap(), seconds(Some("300")).unwrap()), (None, Some(300)));
+        assert_eq!(
+            [amount("word", None), amount("world", None), amount("world", Some(9))],
+            ["-runs=50000", "-runs=300", "-max_total_time=9"]
+        );
         assert_eq!(seconds(Some("5min")).unwrap_err().code, 2);
         assert!(seconds(Some("0")).is_err());
     }
