@@ -6,6 +6,7 @@ use types::Time;
 use types::messages::{Battery, Bumper, Echoes, Gyro, Head, Image, LaserScan, Odometry, Twist, WheelTicks};
 
 use crate::description::RobotDescription;
+use crate::gate::Permit;
 
 /// The way from a driver to a robot's body, real, simulated or recorded.
 ///
@@ -18,7 +19,24 @@ use crate::description::RobotDescription;
 /// - A driver MUST NOT compute a reading that nobody wants, and what it leaves out MUST NOT change what it delivers.
 /// - A driver MUST NOT deliver anything that the robot's own sensors could not know.
 ///
-/// A driver is given to a [`Gate`](crate::Gate) and from then on reached only through it.
+/// A driver is given to a [`Gate`](crate::Gate) and from then on reached only through it. What moves the robot asks for a [`Permit`], and
+/// only gates have one:
+///
+/// ```compile_fail,E0423
+/// # use hardware::{Driver, gate::Permit};
+/// # use types::{Time, messages::Twist};
+/// fn past_the_gate(driver: &mut dyn Driver) {
+///     let _ = driver.drive(&Permit(()), Time::ZERO, Twist::new(0.3, 0.0));
+/// }
+/// ```
+///
+/// ```compile_fail,E0061
+/// # use hardware::{Driver, gate::Permit};
+/// # use types::{Time, messages::Twist};
+/// fn without_asking(driver: &mut dyn Driver) {
+///     let _ = driver.drive(Time::ZERO, Twist::new(0.3, 0.0));
+/// }
+/// ```
 pub trait Driver: Send {
     /// What the robot is. It never changes.
     fn describe(&self) -> &RobotDescription;
@@ -30,10 +48,10 @@ pub trait Driver: Send {
     fn poll(&mut self, now: Time, wanted: &Listening, sink: &mut dyn Sink) -> Result<Polled, DriverError>;
 
     /// Sets the wheels in motion until the next call, or the watchdog. `twist` is finite and within the robot's limits.
-    fn drive(&mut self, now: Time, twist: Twist) -> Result<(), DriverError>;
+    fn drive(&mut self, permit: &Permit, now: Time, twist: Twist) -> Result<(), DriverError>;
 
     /// Turns the head. `head` is finite and within the robot's limits.
-    fn turn_head(&mut self, now: Time, head: Head) -> Result<(), DriverError>;
+    fn turn_head(&mut self, permit: &Permit, now: Time, head: Head) -> Result<(), DriverError>;
 }
 
 /// Which readings somebody wants.

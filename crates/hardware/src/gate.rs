@@ -28,6 +28,10 @@ impl Count {
     }
 }
 
+/// The right to move a robot. Gates have it, and nobody else can make one.
+#[derive(Debug)]
+pub struct Permit(());
+
 /// What happened at a gate. Nothing is lost in silence.
 #[derive(Debug, Default)]
 pub struct Counts {
@@ -213,7 +217,7 @@ impl Gate {
         if within != head {
             self.counts.clamped.add();
         }
-        self.driver.turn_head(now, within)
+        self.driver.turn_head(&Permit(()), now, within)
     }
 
     /// Decides and writes to the wheels.
@@ -235,7 +239,7 @@ impl Gate {
         let contact = Contact::of(self.pressed, self.driver.describe().bumper_sectors);
         let verdict = guard.decide(now, latch, contact);
         let event = event.or_else(|| self.look_at(verdict.reason));
-        self.driver.drive(now, verdict.twist).inspect_err(|_| {
+        self.driver.drive(&Permit(()), now, verdict.twist).inspect_err(|_| {
             self.counts.failures.add();
             self.latch.set(Cause::Hardware, now);
         })?;
@@ -276,6 +280,6 @@ impl Gate {
 impl Drop for Gate {
     fn drop(&mut self) {
         // Should this fail too, the robot's own watchdog is what is left.
-        let _ = self.driver.drive(self.last_seen, Twist::ZERO);
+        let _ = self.driver.drive(&Permit(()), self.last_seen, Twist::ZERO);
     }
 }

@@ -5,6 +5,7 @@ use types::{Duration, Time};
 
 use crate::description::RobotDescription;
 use crate::driver::{Driver, DriverError, Listening, Polled, Sink};
+use crate::gate::Permit;
 use crate::lines::Report;
 
 /// One record.
@@ -133,11 +134,11 @@ impl Driver for Recorded {
         Ok(Polled { ended: true, ..Polled::default() })
     }
 
-    fn drive(&mut self, _: Time, _: Twist) -> Result<(), DriverError> {
+    fn drive(&mut self, _: &Permit, _: Time, _: Twist) -> Result<(), DriverError> {
         Ok(())
     }
 
-    fn turn_head(&mut self, _: Time, _: Head) -> Result<(), DriverError> {
+    fn turn_head(&mut self, _: &Permit, _: Time, _: Head) -> Result<(), DriverError> {
         Ok(())
     }
 }

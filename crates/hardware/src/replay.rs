@@ -16,6 +16,7 @@ use types::{Duration, Message, Time, cdr};
 
 use crate::description::{ClockKind, LASER, RobotDescription};
 use crate::driver::{Driver, DriverError, Listening, Polled, Sink};
+use crate::gate::Permit;
 
 /// Why a log cannot be played.
 #[derive(Debug, thiserror::Error)]
@@ -280,11 +281,11 @@ impl Driver for Replayed {
         }
     }
 
-    fn drive(&mut self, _: Time, _: Twist) -> Result<(), DriverError> {
+    fn drive(&mut self, _: &Permit, _: Time, _: Twist) -> Result<(), DriverError> {
         Ok(())
     }
 
-    fn turn_head(&mut self, _: Time, _: Head) -> Result<(), DriverError> {
+    fn turn_head(&mut self, _: &Permit, _: Time, _: Head) -> Result<(), DriverError> {
         Ok(())
     }
 }

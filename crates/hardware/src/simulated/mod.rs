@@ -27,6 +27,7 @@ use world::World;
 use crate::cadence::Cadence;
 use crate::description::{CAMERA, ClockKind, HeadLimits, LASER, Periods, RobotDescription};
 use crate::driver::{Driver, DriverError, Listening, Polled, Sink};
+use crate::gate::Permit;
 
 /// A robot to be put into a world.
 #[derive(Clone, Debug)]
@@ -314,14 +315,14 @@ impl Driver for Simulated {
         Ok(Polled { pressed, newly_pressed, next: None, ended: false })
     }
 
-    fn drive(&mut self, _: Time, twist: Twist) -> Result<(), DriverError> {
+    fn drive(&mut self, _: &Permit, _: Time, twist: Twist) -> Result<(), DriverError> {
         let Some(limits) = &self.description.limits else { return Ok(()) };
         let wheels = limits.drive.wheels(twist);
         locked(&self.world).command_wheels(self.id, wheels.left, wheels.right);
         Ok(())
     }
 
-    fn turn_head(&mut self, _: Time, head: Head) -> Result<(), DriverError> {
+    fn turn_head(&mut self, _: &Permit, _: Time, head: Head) -> Result<(), DriverError> {
         locked(&self.world).command_head(self.id, head.pan, head.tilt);
         Ok(())
     }

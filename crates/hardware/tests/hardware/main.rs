@@ -4,5 +4,6 @@
 #![allow(clippy::unwrap_used, clippy::print_stdout)]
 
 mod data;
+mod past;
 mod replay;
 mod whole;

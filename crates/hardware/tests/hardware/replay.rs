@@ -6,7 +6,7 @@ use std::path::PathBuf;
 use hardware::driver::{FillImage, FillScan};
 use hardware::replay::{ReplayError, Replayed};
 use hardware::simulated::{self, Robot as Body};
-use hardware::{Driver, Listening, Sink};
+use hardware::{Authority, Driver, Gate, Latch, Listening, Sink};
 use record::log::{ChannelId, RunInfo, Writer};
 use sim::{Model, WorldPlan};
 use types::messages::{
@@ -60,18 +60,19 @@ impl Sink for Encoded {
 }
 
 /// A drive of two seconds in a hall.
-fn driven() -> (simulated::Simulated, Heard) {
+fn driven() -> (Gate, Heard) {
     let model = Model::h1().with_laser(181, std::f64::consts::PI);
     let plan = WorldPlan::hall(8.0, 6.0);
     let body = Body { name: "h1".into(), model, start: Pose::new(4.0, 3.0, 0.3), goal: None };
     let (mut bodies, _) = simulated::raise(&plan, 5, &[body]).unwrap();
-    let (mut driver, mut heard) = (bodies.remove(0), Encoded::default());
+    let (mut gate, mut heard) = (Gate::new(bodies.remove(0), Latch::private()), Encoded::default());
     for cycle in 0..=200 {
         let now = Time(cycle * 10_000_000);
-        driver.poll(now, &Listening::ALL, &mut heard).unwrap();
-        driver.drive(now, Twist::new(0.3, 0.2)).unwrap();
+        gate.poll(now, &Listening::ALL, &mut heard).unwrap();
+        gate.command(now, Authority::Robot, now, Twist::new(0.3, 0.2));
+        gate.apply(now).unwrap();
     }
-    (driver, heard.0)
+    (gate, heard.0)
 }
 
 fn log(name: &str, heard: &Heard, mounts: &[FrameTransform]) -> PathBuf {
@@ -104,13 +105,13 @@ fn log(name: &str, heard: &Heard, mounts: &[FrameTransform]) -> PathBuf {
 
 #[test]
 fn a_logged_drive_is_replayed_byte_for_byte() {
-    let (driver, heard) = driven();
+    let (gate, heard) = driven();
     assert!(heard.iter().filter(|(port, ..)| *port == "image").count() == 30, "two seconds of pictures");
-    let path = log("drive", &heard, &driver.describe().mounts);
+    let path = log("drive", &heard, &gate.description().mounts);
     let mut replayed = Replayed::open(&path, "h1").unwrap();
     let description = replayed.describe();
     assert_eq!((description.beams, description.picture), (181, 320 * 240 * 3));
-    assert_eq!(description.mounts, driver.describe().mounts);
+    assert_eq!(description.mounts, gate.description().mounts);
     let (mut again, mut now) = (Encoded::default(), Time::ZERO);
     loop {
         let polled = replayed.poll(now, &Listening::ALL, &mut again).unwrap();
@@ -126,8 +127,8 @@ fn a_logged_drive_is_replayed_byte_for_byte() {
 
 #[test]
 fn a_log_without_the_robot_names_those_it_has() {
-    let (driver, heard) = driven();
-    let path = log("other", &heard[..20].to_vec(), &driver.describe().mounts);
+    let (gate, heard) = driven();
+    let path = log("other", &heard[..20].to_vec(), &gate.description().mounts);
     let Err(error) = Replayed::open(&path, "h2") else { panic!("it holds no h2") };
     assert!(matches!(&error, ReplayError::NoRobot { found, .. } if found == "h1"), "{error}");
     std::fs::remove_file(path).unwrap();
