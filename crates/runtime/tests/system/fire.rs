@@ -18,6 +18,8 @@ use crate::{Source, SourceParams, options};
 const CHANGES: u64 = 10_000;
 /// After so many, everything that is made once is there.
 const WARM: u64 = 2_000;
+/// A machine that is busy with other things may let a step wait for a long time.
+const PATIENCE: Duration = Duration::secs(30);
 /// The agents that come and go.
 const GUESTS: u64 = 8;
 
@@ -70,16 +72,16 @@ fn types() -> Registry {
 /// A source and a host on executors of their own.
 fn plan() -> Plan {
     let mut plan = Plan::new("fire");
-    let source = plan.add::<Source>("source", SourceParams::default());
-    let host = plan.add::<Host>("host", Default::default());
+    plan.add::<Source>("source", SourceParams::default());
+    plan.add::<Host>("host", Default::default());
     let mut wire = WirePlan::new("source.out", "host.count");
     wire.depth = Some(4096);
-    let _ = (source, host);
     plan.wires.push(wire);
     plan.every("source", Duration::millis(1));
     plan.on("host", "count");
     for (agent, executor) in [("source", "reflex"), ("host", "control")] {
-        plan.agent_mut(agent).unwrap().executor = Some(executor.into());
+        let agent = plan.agent_mut(agent).unwrap();
+        (agent.executor, agent.hang_after) = (Some(executor.into()), Some(PATIENCE));
     }
     plan
 }
@@ -88,7 +90,7 @@ fn guest(name: &str, place: usize) -> AgentPlan {
     let mut plan = AgentPlan { name: name.into(), kind: "guest".into(), ..AgentPlan::default() };
     plan.executor = Some(["reflex", "control", "vision"][place % 3].into());
     plan.on = vec!["count".into()];
-    plan.deadline = Some(Duration::millis(10));
+    (plan.deadline, plan.hang_after) = (Some(Duration::millis(10)), Some(PATIENCE));
     plan
 }
 
