@@ -33,7 +33,7 @@ impl Door {
     /// Sets bits, and wakes the executor if it sleeps.
     #[inline]
     pub(crate) fn ring(&self, bits: u64) {
-        // Release, for what was pushed, pairs with the acquires in `take` and `sleep`; acquire, for the flag, with the release in `sleep`.
+        // Release, for what was pushed, pairs with the acquire in `take`; acquire, for the flag, with the release in `sleep`.
         self.ready.fetch_or(bits, named("door: ring", Ordering::AcqRel));
         let sleeping = &self.sleeping.word;
         // Of several senders one wakes it.

@@ -57,9 +57,10 @@ impl Running {
         self.step.store(self.step.load(Ordering::Relaxed) >> 32 << 32, Ordering::Relaxed);
     }
 
-    /// The step that is going on. Says nothing of what was done before it: who needs that makes a barrier.
+    /// The step that is going on. What is said of it in the other words is that of this step or a later one.
     pub(crate) fn in_step(&self) -> Option<InStep> {
-        let word = self.step.load(Ordering::Relaxed);
+        // Pairs with the release in `begin`: since when and how long it may last were written before it.
+        let word = self.step.load(Ordering::Acquire);
         (word as u32 != 0).then_some(InStep(word))
     }
 

@@ -82,11 +82,18 @@ enum Committed {
     NotDrained,
 }
 
-/// A wire on which nobody sends any more, in the mailbox of an agent whose executor did not answer.
-struct Leaving {
+/// An end of a wire that is no more, which an executor did not let go of because it did not answer.
+struct Owed {
     executor: usize,
-    end: Arc<dyn InputEnd>,
     wire: WireId,
+    end: OwedEnd,
+}
+
+enum OwedEnd {
+    /// Somebody sends still, into a mailbox that nobody reads.
+    Forget(Arc<dyn OutputEnd>),
+    /// Nobody sends any more.
+    Leave(Arc<dyn InputEnd>),
 }
 
 struct Wire {
@@ -141,7 +148,8 @@ pub(crate) struct Router {
     restarting: usize,
     /// Deaths that were read while waiting for something else.
     died: Vec<(usize, Answer)>,
-    leaving: Vec<Leaving>,
+    /// What executors owe from a time when they did not answer.
+    owed: Vec<Owed>,
     log: LogChoice,
     pub log_shared: Arc<LogShared>,
     robots: Vec<String>,
@@ -171,7 +179,7 @@ impl Router {
             incidents: Vec::new(),
             restarting: 0,
             died: Vec::new(),
-            leaving: Vec::new(),
+            owed: Vec::new(),
             log: LogChoice::default(),
             log_shared: LogShared::new(),
             robots,

@@ -100,8 +100,9 @@ pub(crate) fn heaps_for(agents: usize) -> (Releases, Due) {
 
 /// What an executor tells the control side.
 pub(crate) enum Answer {
-    Done(Change),
-    NotDrained(Change),
+    /// With the number of the change.
+    Done(u64, Change),
+    NotDrained(u64, Change),
     /// It had been taken back before the executor came upon it.
     TakenBack(Change),
     Died {
@@ -136,7 +137,12 @@ impl Link {
         has_room
     }
 
-    /// Takes the last change back. False when the executor has begun it: then its answer comes at once.
+    /// The number of the change that was given last.
+    pub(crate) fn last_given(&self) -> u64 {
+        self.given
+    }
+
+    /// Takes the last change back. False when the executor has begun it: then its answer is on the way.
     pub(crate) fn take_back(&mut self) -> bool {
         self.turn.decide(self.given)
     }
@@ -173,7 +179,7 @@ impl Core {
             if !matches!(change, Change::Stop | Change::Unseat { .. } | Change::Body { .. }) {
                 self.note_allocations(allocations::so_far() - before);
             }
-            self.answer(if done { Answer::Done(change) } else { Answer::NotDrained(change) });
+            self.answer(if done { Answer::Done(number, change) } else { Answer::NotDrained(number, change) });
         }
     }
 
@@ -213,11 +219,12 @@ impl Core {
             Change::Order { order, ranks, words, releases, due } => {
                 self.reorder(order, ranks, words);
                 if releases.capacity() > self.releases.capacity() {
-                    releases.append(&mut self.releases);
+                    // One by one: `append` would exchange the two when this one is longer, and the room would go back.
+                    releases.extend(self.releases.drain());
                     core::mem::swap(releases, &mut self.releases);
                 }
                 if due.capacity() > self.due.capacity() {
-                    due.append(&mut self.due);
+                    due.extend(self.due.drain());
                     core::mem::swap(due, &mut self.due);
                 }
             }

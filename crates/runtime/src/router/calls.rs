@@ -193,13 +193,12 @@ impl Router {
         !self.calls.is_empty()
     }
 
-    /// Takes the ends of a call away from the service. What an executor that does not answer keeps goes with the agent.
+    /// Takes the ends of a call away from the service.
     fn hang_up(&mut self, under_way: &UnderWay, fabric: &mut dyn Fabric) {
         let Some(known) = self.by_id(under_way.agent) else { return };
         let (executor, ends) = (known.executor, known.ends[under_way.port].clone());
         if let Some(end) = ends.output {
-            let into = end.forgetting_box();
-            let _ = self.commit(executor, Change::Forget { end, wire: under_way.answer, into }, fabric);
+            self.forget(executor, end, under_way.answer, fabric);
         }
         if let Some(end) = ends.input {
             self.leave(executor, end, under_way.question, true, fabric);

@@ -53,8 +53,8 @@ impl Router {
 
     pub(super) fn commit(&mut self, executor: usize, change: Change, fabric: &mut dyn Fabric) -> Reply<()> {
         self.commit_and_get(executor, change, fabric)?;
-        if !self.leaving.is_empty() {
-            self.leave_late(executor, fabric);
+        if !self.owed.is_empty() {
+            self.make_up(executor, fabric);
         }
         Ok(())
     }
@@ -73,33 +73,42 @@ impl Router {
         if !self.executors[executor].link.change(change) {
             return Err(busy());
         }
+        let given = self.executors[executor].link.last_given();
         let mut too_late = false;
         loop {
             let go_on = fabric.pump(executor);
             while let Some(answer) = self.executors[executor].link.answer() {
                 match answer {
-                    // Of a request that was refused earlier.
-                    Answer::TakenBack(change) => drop(change),
-                    Answer::Done(change) => {
+                    Answer::Done(number, change) if number == given => {
                         fabric.answered();
                         drop(change);
                         return Ok(Committed::Done);
                     }
-                    Answer::NotDrained(change) => {
+                    Answer::NotDrained(number, change) if number == given => {
                         fabric.answered();
                         drop(change);
                         return Ok(Committed::NotDrained);
                     }
+                    // Of a request that was refused earlier.
+                    Answer::TakenBack(change) | Answer::Done(_, change) | Answer::NotDrained(_, change) => {
+                        drop(change)
+                    }
                     died @ Answer::Died { .. } => self.died.push((executor, died)),
                 }
             }
-            // One that the executor has begun is not taken back: its answer comes at once.
-            if !go_on && !too_late {
-                if self.executors[executor].link.take_back() {
-                    return Err(busy());
-                }
-                too_late = true;
+            if go_on {
+                continue;
             }
+            // One that the executor has begun is not taken back: its answer is on the way, unless an agent does not return from
+            // its stop.
+            if too_late {
+                return Err(Refusal::new("the executor has begun it, and does not answer")
+                    .help("an agent in it does not return from its stop, or from taking over"));
+            }
+            if self.executors[executor].link.take_back() {
+                return Err(busy());
+            }
+            too_late = true;
         }
     }
 

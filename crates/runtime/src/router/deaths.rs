@@ -99,12 +99,11 @@ impl Router {
             let side = |id: AgentId, port: usize| {
                 self.by_id(id).map(|known| (known.executor, known.ends[port].clone()))
             };
-            // What an executor does not answer to now, it does later: the change waits in its ring.
+            // What an executor does not let go of now, it does when it answers again.
             if from.0 != id
                 && let Some((executor, PortEnds { output: Some(end), .. })) = side(from.0, from.1)
             {
-                let into = end.forgetting_box();
-                let _ = self.commit(executor, Change::Forget { end, wire, into }, fabric);
+                self.forget(executor, end, wire, fabric);
             } else if to.0 != id
                 && let Some((executor, PortEnds { input: Some(end), .. })) = side(to.0, to.1)
             {

@@ -4,10 +4,10 @@ use std::sync::Arc;
 
 use types::{AgentId, Filter, Priority};
 
-use super::{Committed, Fabric, Leaving, Reply, Router, Wire};
+use super::{Committed, Fabric, Owed, OwedEnd, Reply, Router, Wire};
 use crate::executor::Change;
 use crate::plan::{USUAL_DEPTH, USUAL_DEPTH_ON, WirePlan};
-use crate::port::{Direction, InputEnd, NoSeat, PortEnds, Target, WireCounts, WireId, WireSpec};
+use crate::port::{Direction, InputEnd, NoSeat, OutputEnd, PortEnds, Target, WireCounts, WireId, WireSpec};
 use crate::request::Refusal;
 use crate::ring::Overload;
 use crate::service::answers_for;
@@ -238,20 +238,37 @@ impl Router {
                 Ok(Committed::Done) => return,
                 Ok(Committed::NotDrained) => {}
                 Err(_) => {
-                    self.leaving.push(Leaving { executor, end, wire });
+                    self.owed.push(Owed { executor, wire, end: OwedEnd::Leave(end) });
                     return;
                 }
             }
         }
     }
 
+    /// Takes the route of a wire out of an output. An executor that does not answer does it when it does.
+    pub(super) fn forget(
+        &mut self,
+        executor: usize,
+        end: Arc<dyn OutputEnd>,
+        wire: WireId,
+        fabric: &mut dyn Fabric,
+    ) {
+        let into = end.forgetting_box();
+        if self.commit_and_get(executor, Change::Forget { end: end.clone(), wire, into }, fabric).is_err() {
+            self.owed.push(Owed { executor, wire, end: OwedEnd::Forget(end) });
+        }
+    }
+
     /// An executor has answered: what it owes from the time when it did not is made up for.
-    pub(super) fn leave_late(&mut self, executor: usize, fabric: &mut dyn Fabric) {
-        while let Some(at) = self.leaving.iter().position(|leaving| leaving.executor == executor) {
-            let Leaving { end, wire, .. } = self.leaving.swap_remove(at);
-            let before = self.leaving.len();
-            self.leave(executor, end, wire, true, fabric);
-            if self.leaving.len() > before {
+    pub(super) fn make_up(&mut self, executor: usize, fabric: &mut dyn Fabric) {
+        while let Some(at) = self.owed.iter().position(|owed| owed.executor == executor) {
+            let Owed { wire, end, .. } = self.owed.swap_remove(at);
+            let before = self.owed.len();
+            match end {
+                OwedEnd::Forget(end) => self.forget(executor, end, wire, fabric),
+                OwedEnd::Leave(end) => self.leave(executor, end, wire, true, fabric),
+            }
+            if self.owed.len() > before {
                 return;
             }
         }

@@ -161,6 +161,20 @@ fn in_simulated_time_no_request_makes_a_real_time_step_take_memory() {
 }
 
 #[test]
+fn many_periodic_agents_on_one_executor_take_none_either() {
+    let mut plan = Plan::new("many");
+    for i in 0..200 {
+        let name = format!("source{i}");
+        plan.add::<Source>(&name, SourceParams::default());
+        plan.every(&name, Duration::millis(5 + i % 7));
+        plan.agent_mut(&name).unwrap().executor = Some("reflex".into());
+    }
+    let report = Simulation::new(&plan, &types(), options(200)).unwrap().run().unwrap();
+    assert!(report.view.agents.iter().all(|agent| agent.counts.releases > 15));
+    nobody_took_any(&report);
+}
+
+#[test]
 fn who_takes_memory_is_told() {
     let mut plan = plan("greedy");
     plan.add::<Greedy>("greedy", Default::default());
