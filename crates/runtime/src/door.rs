@@ -10,6 +10,8 @@ pub(crate) const CHANGES: u64 = 1 << 63;
 
 const AWAKE: u32 = 0;
 const ASLEEP: u32 = 1;
+/// Somebody is about to wake the executor. Until that is done others do it too: who is about to may have been pre-empted.
+const RINGING: u32 = 2;
 
 /// A word of ready bits and a flag that says whether somebody sleeps behind it.
 ///
@@ -35,10 +37,18 @@ impl Door {
     pub(crate) fn ring(&self, bits: u64) {
         // Release, for what was pushed, pairs with the acquire in `take`; acquire, for the flag, with the release in `sleep`.
         self.ready.fetch_or(bits, named("door: ring", Ordering::AcqRel));
+        if self.sleeping.word.load(Ordering::Relaxed) != AWAKE {
+            self.wake();
+        }
+    }
+
+    fn wake(&self) {
         let sleeping = &self.sleeping.word;
-        // Of several senders one wakes it.
-        if sleeping.load(Ordering::Relaxed) == ASLEEP && sleeping.swap(AWAKE, Ordering::Relaxed) == ASLEEP {
+        let seen = sleeping.compare_exchange(ASLEEP, RINGING, Ordering::Relaxed, Ordering::Relaxed);
+        if seen != Err(AWAKE) {
             self.sleeping.wake();
+            // Done: whoever comes now need not do it again. Where the executor was awake and sleeps again, nothing changes.
+            let _ = sleeping.compare_exchange(RINGING, AWAKE, Ordering::Relaxed, Ordering::Relaxed);
         }
     }
 
@@ -66,6 +76,39 @@ impl Door {
             self.sleeping.wait(ASLEEP, until);
         }
         self.sleeping.word.swap(AWAKE, Ordering::Relaxed);
+    }
+}
+
+#[cfg(test)]
+#[cfg(not(loom))]
+mod tests {
+    use super::*;
+    use std::sync::Arc;
+
+    /// A sender of low priority was pre-empted when it was about to wake the executor: another one does it.
+    #[test]
+    fn who_was_about_to_ring_is_not_waited_for() {
+        let door = Arc::new(Door::new());
+        let behind = door.clone();
+        let sleeper = std::thread::Builder::new().spawn(move || behind.sleep(None)).unwrap();
+        while door
+            .sleeping
+            .word
+            .compare_exchange(ASLEEP, RINGING, Ordering::Relaxed, Ordering::Relaxed)
+            .is_err()
+        {
+            std::thread::yield_now();
+        }
+        // It may not have gone to sleep yet, and then need not be woken.
+        let mut patience = 1_000_000;
+        while !sleeper.is_finished() {
+            door.sleeping.word.store(RINGING, Ordering::Relaxed);
+            door.ring(CHANGES);
+            std::thread::yield_now();
+            patience -= 1;
+            assert!(patience > 0, "it sleeps on behind a door that rings");
+        }
+        sleeper.join().unwrap();
     }
 }
 
