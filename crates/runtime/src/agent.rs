@@ -99,17 +99,19 @@ pub struct Step {
 impl Step {
     /// Asks for one more step at `time`, besides those that are due anyway.
     pub fn wake_at(&mut self, time: Time) {
-        crate::context::current(|context| context.wake_at(time));
+        if let Some(context) = crate::context::current() {
+            context.wake_at(time);
+        }
     }
 
     /// The number of the agent with this name, if there is one.
     pub fn agent_named(&self, name: &str) -> Option<AgentId> {
-        crate::context::current(|context| context.directory().find(name)).flatten()
+        crate::context::current()?.directory().find(name)
     }
 
     /// The name of the agent with this number.
     pub fn name_of(&self, agent: AgentId) -> Option<types::Name> {
-        crate::context::current(|context| context.directory().name(agent)).flatten()
+        crate::context::current()?.directory().name(agent)
     }
 
     /// How long the step may take.

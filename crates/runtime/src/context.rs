@@ -8,73 +8,15 @@ use std::sync::Arc;
 
 use types::{AgentId, Time};
 
+use crate::agent::Fault;
 use crate::door::{Door, bit_of};
 use crate::names::Directory;
 use crate::trace;
 
 /// How many doors one step can owe a wake-up before the first is rung early.
 const DOORS: usize = 16;
-
-/// The agents of one executor that have something to do, a bit each in data-flow order.
-#[derive(Debug, Default)]
-pub(crate) struct ReadySet {
-    words: UnsafeCell<Vec<u64>>,
-    rank_of: UnsafeCell<Vec<u32>>,
-}
-
-impl ReadySet {
-    #[allow(clippy::mut_from_ref)]
-    fn words(&self) -> &mut Vec<u64> {
-        // SAFETY: a ready set is touched only by the thread that runs its executor, and no reference leaves this module.
-        unsafe { &mut *self.words.get() }
-    }
-
-    /// Says in which place of the data flow each slot stands, with room for all of them.
-    pub(crate) fn set_order(&self, ranks: &mut Vec<u32>, words: &mut Vec<u64>) {
-        // SAFETY: as in `words`.
-        core::mem::swap(unsafe { &mut *self.rank_of.get() }, ranks);
-        core::mem::swap(self.words(), words);
-    }
-
-    #[inline]
-    pub(crate) fn rank_of(&self, slot: u32) -> Option<u32> {
-        // SAFETY: as in `words`.
-        unsafe { (&*self.rank_of.get()).get(slot as usize).copied().filter(|rank| *rank != u32::MAX) }
-    }
-
-    #[inline]
-    pub(crate) fn mark(&self, slot: u32) {
-        if let Some(rank) = self.rank_of(slot) {
-            self.words()[rank as usize / 64] |= 1 << (rank % 64);
-        }
-    }
-
-    #[inline]
-    pub(crate) fn clear(&self, rank: u32) {
-        self.words()[rank as usize / 64] &= !(1 << (rank % 64));
-    }
-
-    /// Whether none is ready.
-    #[inline]
-    pub(crate) fn is_empty(&self) -> bool {
-        self.words().iter().all(|word| *word == 0)
-    }
-
-    /// The first rank at or behind `from` that is ready.
-    #[inline]
-    pub(crate) fn next(&self, from: u32) -> Option<u32> {
-        let words = self.words();
-        let mut word = from as usize / 64;
-        let mut bits = *words.get(word)? & (u64::MAX << (from % 64));
-        loop {
-            if bits != 0 {
-                return Some(word as u32 * 64 + bits.trailing_zeros());
-            }
-            word += 1;
-            bits = *words.get(word)?;
-        }
-    }
-}
+/// How many agents of its own executor one step can wake by name; more, and all mailboxes there are looked at after it.
+const WOKEN: usize = 128;
 
 /// What is known of a panic: a fixed record, written without allocation.
 #[derive(Clone, Copy, Debug)]
@@ -128,11 +70,15 @@ pub(crate) struct Context {
     agent: Cell<AgentId>,
     alarm: Cell<Time>,
     executor: Cell<u32>,
-    ready: Cell<*const ReadySet>,
+    /// Slots of this thread's own executor that have got a message. They belong to the thread: one that lost its executor within a step
+    /// may still send, and reaches nothing that is another's by now.
+    woken: [Cell<u32>; WOKEN],
+    woken_len: Cell<usize>,
     owed: [Cell<(*const Door, u64)>; DOORS],
     owed_len: Cell<usize>,
     log: UnsafeCell<Option<trace::Writer>>,
     panic: Cell<PanicRecord>,
+    fault: Cell<Option<Fault>>,
     in_step: Cell<bool>,
     directory: Arc<Directory>,
 }
@@ -143,10 +89,10 @@ thread_local! {
 
 /// The context of the calling thread, if it runs agents.
 #[inline]
-pub(crate) fn current<R>(use_it: impl FnOnce(&Context) -> R) -> Option<R> {
-    let context = CURRENT.with(Cell::get);
-    // SAFETY: `Context::enter` set the pointer, and its guard takes it back before the context goes.
-    (!context.is_null()).then(|| use_it(unsafe { &*context }))
+pub(crate) fn current<'a>() -> Option<&'a Context> {
+    // SAFETY: `Context::enter` set the pointer, and its guard takes it back before the context goes. Nobody keeps the reference for
+    // longer than a call from a step.
+    unsafe { CURRENT.with(Cell::get).as_ref() }
 }
 
 /// Takes the context back from its thread.
@@ -165,11 +111,13 @@ impl Context {
             agent: Cell::new(AgentId::NONE),
             alarm: Cell::new(Time::NEVER),
             executor: Cell::new(u32::MAX),
-            ready: Cell::new(ptr::null()),
+            woken: [const { Cell::new(0) }; WOKEN],
+            woken_len: Cell::new(0),
             owed: [const { Cell::new((ptr::null(), 0)) }; DOORS],
             owed_len: Cell::new(0),
             log: UnsafeCell::new(log),
             panic: Cell::new(PanicRecord::EMPTY),
+            fault: Cell::new(None),
             in_step: Cell::new(false),
             directory,
         })
@@ -181,14 +129,13 @@ impl Context {
         Entered(())
     }
 
-    /// Begins a step. `ready` must outlive it.
+    /// Begins a step.
     #[inline]
-    pub(crate) fn begin(&self, agent: AgentId, now: Time, executor: u32, ready: *const ReadySet) {
+    pub(crate) fn begin(&self, agent: AgentId, now: Time, executor: u32) {
         self.now.set(now);
         self.agent.set(agent);
         self.alarm.set(Time::NEVER);
         self.executor.set(executor);
-        self.ready.set(ready);
         self.in_step.set(true);
     }
 
@@ -196,12 +143,36 @@ impl Context {
     #[inline]
     pub(crate) fn end(&self) -> Time {
         self.in_step.set(false);
+        if self.owed_len.get() > 0 {
+            self.ring_doors();
+        }
+        self.alarm.get()
+    }
+
+    fn ring_doors(&self) {
         for owed in &self.owed[..self.owed_len.take()] {
             let (door, bits) = owed.get();
             // SAFETY: a door is owed only through a route that holds it, and routes change only between steps.
             unsafe { (*door).ring(bits) };
         }
-        self.alarm.get()
+    }
+
+    /// The slots of this thread's own executor that have got a message since the last time, perhaps more than once; nothing when they
+    /// were too many to tell.
+    #[inline]
+    pub(crate) fn take_woken(&self) -> Option<&[Cell<u32>]> {
+        self.woken.get(..self.woken_len.take())
+    }
+
+    /// Keeps what a step reports, until it is known whose its agent is now.
+    #[cold]
+    pub(crate) fn set_fault(&self, fault: Fault) {
+        self.fault.set(Some(fault));
+    }
+
+    /// What the step reported.
+    pub(crate) fn take_fault(&self) -> Option<Fault> {
+        self.fault.take()
     }
 
     #[inline]
@@ -223,10 +194,17 @@ impl Context {
     #[inline]
     pub(crate) fn wake(&self, executor: u32, slot: u32, door: &Arc<Door>) {
         if executor == self.executor.get() {
-            // SAFETY: `begin` was given a ready set that outlives the step.
-            unsafe { (*self.ready.get()).mark(slot) };
+            let len = self.woken_len.get();
+            if let Some(place) = self.woken.get(len) {
+                place.set(slot);
+            }
+            self.woken_len.set(len + 1);
             return;
         }
+        self.owe(slot, door);
+    }
+
+    fn owe(&self, slot: u32, door: &Arc<Door>) {
         let (door, bit) = (Arc::as_ptr(door), bit_of(slot));
         let len = self.owed_len.get();
         for owed in &self.owed[..len] {
@@ -270,7 +248,7 @@ pub(crate) fn install_panic_hook() {
     ONCE.call_once(|| {
         let before = std::panic::take_hook();
         std::panic::set_hook(Box::new(move |info| {
-            let recorded = current(|context| {
+            let recorded = current().map(|context| {
                 if context.in_step.get() {
                     let mut record = PanicRecord::EMPTY;
                     record.fill(info);

@@ -1,34 +1,32 @@
 //! What an operating-system thread runs: agents, one after another.
 //!
 //! The core is the same on every clock. It knows which agents are due or made ready and in which order they go; whoever owns
-//! it says what time it is. An agent's step is the only foreign code, and while it runs nobody holds a reference into the
-//! core: a thread that does not come back from a step can lose the core to another.
-
-#![allow(unsafe_code)]
+//! it says what time it is.
 
 mod change;
+mod ready;
+mod step;
 
 use std::any::Any;
 use std::cmp::Reverse;
 use std::collections::BinaryHeap;
-use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::Arc;
 
 use types::{AgentId, Duration, Name, Time};
 
 pub(crate) use change::{Answer, Change, Link, heaps_for};
 
-use crate::agent::{Body, Fault, Step};
-use crate::allocations;
-use crate::context::{Context, ReadySet};
+use self::ready::ReadySet;
+use crate::agent::{Body, Fault};
+use crate::context::Context;
 use crate::door::{CHANGES, Door};
 use crate::handover::Running;
 use crate::os;
 use crate::port::InputEnd;
-use crate::processor::{Checks, Reading, Stopwatch, agrees};
+use crate::processor::{Checks, rate};
 use crate::ring::{self, ring};
-use crate::stats::{AgentStats, bump, bump_by, nanos};
-use crate::sync::{Ordering, light_barrier};
+use crate::stats::{AgentStats, bump};
+use crate::sync::Ordering;
 use crate::turn::Turn;
 
 /// When an agent runs.
@@ -106,18 +104,6 @@ pub(crate) enum RawCause {
     Hang,
 }
 
-/// The time of a step.
-struct Spent {
-    /// From its beginning to its end, in [`os::ticks`].
-    elapsed: u64,
-    /// What higher executors had of that.
-    others: u64,
-    /// What the thread's clock says (ns), where it was asked.
-    thread: Option<u64>,
-    /// How often it took or freed memory.
-    allocations: u64,
-}
-
 /// An agent that is to run, and why.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Job {
@@ -125,6 +111,8 @@ pub(crate) struct Job {
     /// When it was due; the present for one that a message made run.
     pub release: Time,
     pub deadline: Time,
+    /// Whether its time had come; else a message made it run.
+    pub by_clock: bool,
 }
 
 type Releases = BinaryHeap<Reverse<(Time, u32)>>;
@@ -135,7 +123,7 @@ pub(crate) struct Core {
     pub number: u32,
     pub seats: Vec<Option<Box<Seat>>>,
     order: Vec<u32>,
-    ready: Box<ReadySet>,
+    ready: ReadySet,
     releases: Releases,
     due: Due,
     cursor: u32,
@@ -144,7 +132,8 @@ pub(crate) struct Core {
     changes: ring::Receiver<Option<(u64, Change)>>,
     turn: Arc<Turn>,
     answers: ring::Sender<Option<Answer>>,
-    nanos_per_tick: f64,
+    /// Nanoseconds in a tick, as [`scaled`](crate::processor::scaled) takes it.
+    rate: u64,
     checks: Checks,
     /// How many stalls the witness had seen after the last step.
     stalls: u64,
@@ -176,7 +165,7 @@ impl Core {
             number,
             seats: Vec::new(),
             order: Vec::new(),
-            ready: Box::default(),
+            ready: ReadySet::default(),
             releases: BinaryHeap::with_capacity(SPARE_ALARMS),
             due: BinaryHeap::new(),
             cursor: 0,
@@ -185,7 +174,7 @@ impl Core {
             changes,
             turn: turn.clone(),
             answers,
-            nanos_per_tick: os::nanos_per_tick(),
+            rate: rate(os::nanos_per_tick()),
             checks: Checks::default(),
             stalls: 0,
         };
@@ -193,6 +182,7 @@ impl Core {
     }
 
     /// When the next agent is due by the clock.
+    #[inline]
     pub(crate) fn next_release(&self) -> Time {
         self.releases.peek().map_or(Time::NEVER, |Reverse((time, _))| *time)
     }
@@ -203,12 +193,15 @@ impl Core {
         !self.door.is_rung() && self.next_release() > now && self.due.is_empty() && self.ready.is_empty()
     }
 
-    /// Takes what others have rung for, and serves changes.
-    pub(crate) fn look_at_door(&mut self, context: &Context, now: Time) {
+    /// Takes what others have rung for, and serves changes. Says whether there were any, which took time.
+    #[inline]
+    pub(crate) fn look_at_door(&mut self, context: &Context, now: Time) -> bool {
+        self.door.is_rung() && self.answer_door(context, now)
+    }
+
+    #[inline(never)]
+    fn answer_door(&mut self, context: &Context, now: Time) -> bool {
         let bits = self.door.take();
-        if bits == 0 {
-            return;
-        }
         for slot in 0..self.seats.len() as u32 {
             if bits & crate::door::bit_of(slot) != 0
                 && let Some(seat) = &self.seats[slot as usize]
@@ -217,12 +210,15 @@ impl Core {
                 self.ready.mark(slot);
             }
         }
-        if bits & CHANGES != 0 {
+        let changes = bits & CHANGES != 0;
+        if changes {
             self.serve_changes(context, now);
         }
+        changes
     }
 
     /// Finds ready agents by looking into the mailboxes: after a hand-over, when nobody knows what was rung.
+    #[inline(never)]
     pub(crate) fn find_ready(&mut self) {
         for slot in 0..self.seats.len() as u32 {
             if let Some(seat) = &self.seats[slot as usize]
@@ -235,29 +231,49 @@ impl Core {
 
     /// The agent that runs next: of those that are due the one with the earliest deadline, else the next one in data-flow order
     /// that a message made ready. Agents made ready behind the cursor wait for the next sweep.
+    #[inline(always)]
     pub(crate) fn next(&mut self, now: Time) -> Option<Job> {
-        self.collect_due(now);
-        if let Some(Reverse((deadline, rank, slot, release))) = self.due.pop() {
-            self.ready.clear(rank);
-            return Some(Job { slot, release, deadline });
+        if (self.next_release() <= now || !self.due.is_empty())
+            && let Some(job) = self.next_due(now)
+        {
+            return Some(job);
         }
         loop {
-            let rank = self.ready.next(self.cursor).or_else(|| self.ready.next(0))?;
-            self.ready.clear(rank);
+            let rank = self.ready.take(self.cursor)?;
             self.cursor = rank + 1;
-            let slot = self.order[rank as usize];
-            let Some(seat) = self.seats[slot as usize].as_mut() else { continue };
-            let earliest = seat.last_step.saturating_add(seat.timing.min_gap);
-            if seat.timing.min_gap > Duration::ZERO && earliest > now {
-                // One entry for all messages until then.
-                if seat.put_off != earliest {
-                    seat.put_off = earliest;
-                    self.push_release(earliest, slot);
-                }
+            let slot = *self.order.get(rank as usize)?;
+            let Some(seat) = self.seats.get(slot as usize).and_then(Option::as_deref) else { continue };
+            let deadline = now.saturating_add(seat.timing.deadline);
+            if seat.timing.min_gap > Duration::ZERO && self.is_put_off(slot, now) {
                 continue;
             }
-            return Some(Job { slot, release: now, deadline: now.saturating_add(seat.timing.deadline) });
+            return Some(Job { slot, release: now, deadline, by_clock: false });
         }
+    }
+
+    #[inline(never)]
+    fn next_due(&mut self, now: Time) -> Option<Job> {
+        self.collect_due(now);
+        let Reverse((deadline, rank, slot, release)) = self.due.pop()?;
+        self.ready.clear(rank);
+        Some(Job { slot, release, deadline, by_clock: true })
+    }
+
+    /// Whether a message came too soon after the last step. Then there is one step for all that come until it may be.
+    #[inline(never)]
+    fn is_put_off(&mut self, slot: u32, now: Time) -> bool {
+        let Some(seat) = self.seats.get_mut(slot as usize).and_then(Option::as_deref_mut) else {
+            return true;
+        };
+        let earliest = seat.last_step.saturating_add(seat.timing.min_gap);
+        if earliest <= now {
+            return false;
+        }
+        if seat.put_off != earliest {
+            seat.put_off = earliest;
+            self.push_release(earliest, slot);
+        }
+        true
     }
 
     fn collect_due(&mut self, now: Time) {
@@ -299,6 +315,7 @@ impl Core {
         }
     }
 
+    #[inline(never)]
     fn push_release(&mut self, time: Time, slot: u32) {
         if self.releases.len() == self.releases.capacity() {
             // Entries for which no seat waits any more are of no use; what is left has room.
@@ -311,187 +328,6 @@ impl Core {
             });
         }
         self.releases.push(Reverse((time, slot)));
-    }
-
-    /// Runs one step. `now` is the time that the agent sees. On the wall clock, where there is a stopwatch, time goes on while it
-    /// runs; in simulated time it takes none.
-    ///
-    /// # Safety
-    /// `core` is valid and owned by the calling thread. `still_mine` says after the step whether that is so: if not, the core
-    /// was handed to another thread meanwhile and is not touched any more.
-    pub(crate) unsafe fn run(
-        core: *mut Core,
-        context: &Context,
-        job: Job,
-        now: Time,
-        watch: Option<&Stopwatch<'_>>,
-        still_mine: impl FnOnce() -> bool,
-    ) -> Option<Ended> {
-        let read = || watch.map_or_else(Reading::of_time, Stopwatch::read);
-        let entered = allocations::so_far();
-        let (body, mut step, checked, begun) = {
-            // SAFETY: the caller owns the core; this borrow ends before the step.
-            let core = unsafe { &mut *core };
-            let Some(seat) = core.seats.get_mut(job.slot as usize).and_then(Option::as_mut) else {
-                return Some(Ended::NotRun);
-            };
-            if seat.body.is_none() {
-                return Some(Ended::NotRun);
-            }
-            bump(&seat.stats.releases);
-            match seat.fault {
-                StepFault::None | StepFault::Panic => {}
-                StepFault::Off => return Some(Ended::NotRun),
-                StepFault::Slow if !seat.stats.releases.load(Ordering::Relaxed).is_multiple_of(4) => {
-                    return Some(Ended::NotRun);
-                }
-                StepFault::Slow => {}
-                StepFault::Hang => {
-                    seat.fault = StepFault::None;
-                    core.running.limit.store(seat.timing.hang_after.0 as u64, Ordering::Relaxed);
-                    return Some(Ended::AskedToHang(job.slot));
-                }
-            }
-            let Some(body) = seat.body.take() else { return Some(Ended::NotRun) };
-            seat.last_step = now;
-            seat.put_off = Time::NEVER;
-            seat.stats.jitter.add(nanos(now - job.release));
-            let (seat_id, seat_limit) = (seat.id, seat.timing.hang_after);
-            let step = Step { now, deadline: job.deadline, agent: seat.id, period: seat.timing.period };
-            context.begin(seat.id, now, core.number, &*core.ready);
-            let checked = watch.and_then(|_| core.checks.begin(now));
-            let begun = read();
-            core.running.limit.store(seat_limit.0 as u64, Ordering::Relaxed);
-            core.running.since.store(begun.ticks, Ordering::Relaxed);
-            core.running.agent.store(seat_id.0, Ordering::Relaxed);
-            core.running.begin(job.slot);
-            (body, step, checked, begun)
-        };
-        let (first, panics, taken) = {
-            // SAFETY: as above.
-            let core = unsafe { &mut *core };
-            let seat = core.seats[job.slot as usize].as_mut()?;
-            let first = !core::mem::replace(&mut seat.started, true);
-            let panics = seat.fault == StepFault::Panic;
-            if panics {
-                seat.fault = StepFault::None;
-            }
-            (first, panics, seat.on.iter().map(|input| input.taken()).sum::<u64>())
-        };
-        // SAFETY: as above. The figures are shared with the watchdog's side and outlive the core, whoever has it.
-        let running = unsafe { &*Arc::as_ptr(&(*core).running) };
-        let mut body = Some(body);
-        let before = allocations::so_far();
-        // A step that panics takes memory for that, and a start may; neither counts.
-        let mut in_step = 0;
-        let result = catch_unwind(AssertUnwindSafe(|| {
-            if panics {
-                panic!("asked to panic");
-            }
-            let Some(body) = body.as_mut() else { return Ok(()) };
-            if first {
-                body.start(&mut step)?;
-            }
-            let before = allocations::so_far();
-            let result = body.step(&mut step);
-            in_step = allocations::so_far() - before;
-            result
-        }));
-        let after = allocations::so_far();
-        let ended = read();
-        // First the step is published as ended, then it is asked whose the core is: the watchdog does it the other way round,
-        // with a barrier on all processors between, so that one of the two sees the other.
-        running.end();
-        light_barrier();
-        if !still_mine() {
-            // The watchdog gave the agent up; what it left behind is freed here, on a thread that has lost its priority.
-            return None;
-        }
-        // SAFETY: the core is still this thread's.
-        let core = unsafe { &mut *core };
-        let spent = Spent {
-            elapsed: begun.elapsed(&ended),
-            others: begun.others(&ended),
-            thread: checked.map(|before| os::thread_time().saturating_sub(before)),
-            allocations: in_step,
-        };
-        let alarm = context.end();
-        core.end(context, job, now, result, body, alarm, taken, spent, watch);
-        core.note_allocations((before - entered) + (allocations::so_far() - after));
-        Some(Ended::Normally)
-    }
-
-    #[allow(clippy::too_many_arguments)]
-    fn end(
-        &mut self,
-        context: &Context,
-        job: Job,
-        now: Time,
-        result: Result<Result<(), Fault>, Box<dyn Any + Send>>,
-        mut body: Option<Box<dyn Body>>,
-        alarm: Time,
-        taken: u64,
-        spent: Spent,
-        watch: Option<&Stopwatch<'_>>,
-    ) {
-        let took = (spent.elapsed as f64 * self.nanos_per_tick) as u64;
-        let Some(seat) = self.seats.get_mut(job.slot as usize).and_then(Option::as_mut) else { return };
-        let end = if watch.is_some() { now + Duration(took as i64) } else { now };
-        let stalls = watch.map_or(0, |watch| watch.witness.stalls());
-        // A step in which the processor stood still says nothing of how long it takes.
-        let stalled = stalls != self.stalls && {
-            self.stalls = stalls;
-            watch.is_some_and(|watch| watch.witness.saw_stall(now, end))
-        };
-        if stalled {
-            bump(&seat.stats.left_out);
-        } else {
-            let own = match spent.others {
-                0 => took,
-                others => took.saturating_sub((others as f64 * self.nanos_per_tick) as u64),
-            };
-            seat.stats.exec.add(own);
-            if let Some(used) = spent.thread {
-                seat.stats.check(agrees(own, used));
-            }
-        }
-        if spent.allocations > 0 {
-            bump_by(&seat.stats.allocations, spent.allocations);
-        }
-        seat.stats.response.add(nanos(end - job.release));
-        if end > job.deadline {
-            bump(&seat.stats.missed);
-            if watch.is_some_and(|watch| watch.witness.saw_stall(job.release, end)) {
-                bump(&seat.stats.stalled);
-            }
-        }
-        let cause = match result {
-            Ok(Ok(())) => None,
-            Ok(Err(fault)) => {
-                bump(&seat.stats.faults);
-                Some(RawCause::Fault(fault))
-            }
-            Err(payload) => {
-                bump(&seat.stats.panics);
-                Some(RawCause::Panic(context.panic_record(), payload))
-            }
-        };
-        if let Some(cause) = cause {
-            let id = seat.id;
-            self.answer(Answer::Died { slot: job.slot, id, time: end, cause, body: body.take() });
-            return;
-        }
-        seat.body = body;
-        if alarm < seat.alarm {
-            seat.alarm = alarm;
-            self.push_release(alarm, job.slot);
-        }
-        let Some(seat) = self.seats[job.slot as usize].as_ref() else { return };
-        // What came meanwhile makes it run again; but an agent that does not take its messages is not run for them for ever.
-        let took_some = seat.on.iter().map(|input| input.taken()).sum::<u64>() != taken;
-        if took_some && seat.on.iter().any(|input| input.has_message()) {
-            self.ready.mark(job.slot);
-        }
     }
 
     /// Takes an agent that does not come back from its step for dead. Its body is lost to the step; in simulated time it is

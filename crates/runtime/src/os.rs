@@ -176,6 +176,24 @@ pub(crate) fn ticks() -> u64 {
     }
 }
 
+/// The monotonic clock (ns) and [`ticks`] at one instant: the first try in which nothing happened between, or the best of a few.
+pub(crate) fn monotonic_and_ticks() -> (i64, u64) {
+    /// Three readings take less than this, where nothing disturbs them.
+    const UNDISTURBED: u64 = 500;
+    let mut best = (u64::MAX, 0, 0);
+    for _ in 0..4 {
+        let (before, time, after) = (ticks(), monotonic(), ticks());
+        let between = after.saturating_sub(before);
+        if between < best.0 {
+            best = (between, time, before + between / 2);
+        }
+        if between < UNDISTURBED {
+            break;
+        }
+    }
+    (best.1, best.2)
+}
+
 /// Nanoseconds in a tick of [`ticks`], measured against the monotonic clock.
 pub(crate) fn nanos_per_tick() -> f64 {
     static RATE: std::sync::OnceLock<f64> = std::sync::OnceLock::new();
@@ -183,11 +201,11 @@ pub(crate) fn nanos_per_tick() -> f64 {
         if cfg!(not(target_arch = "x86_64")) {
             return 1.0;
         }
-        let (begin, begun) = (monotonic(), ticks());
+        let (begin, begun) = monotonic_and_ticks();
         while monotonic() - begin < 2_000_000 {
             core::hint::spin_loop();
         }
-        let (end, ended) = (monotonic(), ticks());
+        let (end, ended) = monotonic_and_ticks();
         (end - begin) as f64 / ended.saturating_sub(begun).max(1) as f64
     })
 }

@@ -23,6 +23,7 @@ pub struct WireId(pub u32);
 
 /// What became of the messages of a wire. Each number is written by one side alone.
 #[derive(Debug, Default)]
+#[repr(C, align(64))]
 pub struct WireCounts {
     /// Put into the ring.
     pub sent: AtomicU64,
@@ -30,6 +31,8 @@ pub struct WireCounts {
     pub dropped: AtomicU64,
     /// Given back to the sender.
     pub refused: AtomicU64,
+    /// The two sides are often on two processors, and would take a line of memory from one another.
+    _apart: [u64; 5],
     /// Taken by the receiver.
     pub taken: AtomicU64,
     /// Links whose message had left the memory before it was read.
@@ -162,6 +165,15 @@ pub(crate) struct NoSeat {
     pub seats: usize,
 }
 
+/// What a step did with the messages of an input.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) struct Settled {
+    /// It took some.
+    pub took: bool,
+    /// Some are left.
+    pub left: bool,
+}
+
 /// What the executor asks of the receiving side of a port.
 pub(crate) trait InputEnd: Any + Send + Sync {
     /// Adds the lanes of a wire, using the room that comes with them. The box goes back to be freed.
@@ -174,8 +186,8 @@ pub(crate) trait InputEnd: Any + Send + Sync {
     fn leaving_box(&self) -> Box<dyn Any + Send>;
     /// Whether any message waits.
     fn has_message(&self) -> bool;
-    /// How many messages were taken since the start.
-    fn taken(&self) -> u64;
+    /// After a step: what it did with the messages that waited.
+    fn settle(&self) -> Settled;
     fn message_type(&self) -> &'static MessageType;
     /// An output of the same type that belongs to no agent: for a caller from outside.
     fn facing(&self) -> Arc<dyn OutputEnd>;

@@ -15,6 +15,7 @@
 //! long side. A thread that changed there and back again within a step can err to the short side. Now and then a step
 //! is held against the thread's clock, and how often the two disagree is counted.
 
+use core::cell::Cell;
 use core::sync::atomic::{AtomicU64, Ordering};
 
 use types::{Duration, Time};
@@ -54,6 +55,21 @@ impl Reading {
         Reading { ticks: os::ticks(), processor: NOWHERE, used: 0 }
     }
 
+    /// A reading on a processor of which `line` has been used.
+    #[inline]
+    fn on(processor: usize, line: &AtomicU64) -> Reading {
+        let mut used = line.load(Ordering::Relaxed);
+        loop {
+            let ticks = os::ticks();
+            let again = line.load(Ordering::Relaxed);
+            // A higher executor that ran between the two would count as time and not as its own.
+            if again == used {
+                return Reading { ticks, processor, used };
+            }
+            used = again;
+        }
+    }
+
     /// The ticks from here to `end`.
     #[inline]
     pub(crate) fn elapsed(&self, end: &Reading) -> u64 {
@@ -83,16 +99,7 @@ impl Processors {
     #[inline]
     fn read(&self, processor: usize) -> Reading {
         let Some(Line(line)) = self.used.get(processor) else { return Reading::of_time() };
-        let mut used = line.load(Ordering::Relaxed);
-        loop {
-            let ticks = os::ticks();
-            let again = line.load(Ordering::Relaxed);
-            // A higher executor that ran between the two would count as time and not as its own.
-            if again == used {
-                return Reading { ticks, processor, used };
-            }
-            used = again;
-        }
+        Reading::on(processor, line)
     }
 
     /// Adds what an executor used of its processor.
@@ -103,6 +110,85 @@ impl Processors {
             // The addition is one instruction, so a higher executor between load and store loses nothing.
             line.fetch_add(from.own(to), Ordering::Relaxed);
         }
+    }
+}
+
+/// The time of the run by the ticks of the processor, held against the clock again and again.
+///
+/// To read the clock costs three times what reading the ticks does, and what happens between two steps reads it once.
+#[derive(Debug)]
+struct Pace {
+    /// From the monotonic clock to the time of the run (ns).
+    offset: i64,
+    /// When the clock was last read: ticks, and the time of the run.
+    ticks: Cell<u64>,
+    time: Cell<i64>,
+    /// Nanoseconds in a tick, in units of 2⁻³².
+    rate: u64,
+    /// After how many ticks the clock is read again.
+    good_for: u64,
+}
+
+/// For how long the ticks alone tell the time (ns). A clock that is being corrected by the most that is usual, half a thousandth,
+/// differs by half a microsecond then.
+const GOOD_FOR: f64 = 1e6;
+
+impl Pace {
+    fn new(offset: i64) -> Pace {
+        let nanos_per_tick = os::nanos_per_tick();
+        let pace = Pace {
+            offset,
+            ticks: Cell::new(0),
+            time: Cell::new(0),
+            rate: rate(nanos_per_tick),
+            good_for: (GOOD_FOR / nanos_per_tick) as u64,
+        };
+        pace.renew();
+        pace
+    }
+
+    fn renew(&self) {
+        let (monotonic, ticks) = os::monotonic_and_ticks();
+        self.time.set(monotonic + self.offset);
+        self.ticks.set(ticks);
+    }
+
+    #[inline]
+    fn is_old(&self, ticks: u64) -> bool {
+        ticks.wrapping_sub(self.ticks.get()) > self.good_for
+    }
+
+    #[inline]
+    fn time(&self, ticks: u64) -> Time {
+        // Ticks of another processor can be a few behind.
+        Time(self.time.get() + scaled(ticks.saturating_sub(self.ticks.get()), self.rate) as i64)
+    }
+}
+
+/// Nanoseconds in a tick, in units of 2⁻³².
+pub(crate) fn rate(nanos_per_tick: f64) -> u64 {
+    (nanos_per_tick * 4_294_967_296.0) as u64
+}
+
+/// Ticks in nanoseconds.
+#[inline]
+pub(crate) fn scaled(ticks: u64, rate: u64) -> u64 {
+    ((u128::from(ticks) * u128::from(rate)) >> 32) as u64
+}
+
+/// A point in the run between two steps: the end of one, and the beginning of the next.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Moment {
+    /// What agents see.
+    pub time: Time,
+    pub reading: Reading,
+}
+
+impl Moment {
+    /// In simulated time, which a step does not take.
+    #[inline]
+    pub(crate) fn simulated(time: Time) -> Moment {
+        Moment { time, reading: Reading::of_time() }
     }
 }
 
@@ -117,35 +203,70 @@ pub(crate) struct Stopwatch<'a> {
     processors: &'a Processors,
     /// The real-time priority that was granted; zero for an ordinary thread.
     level: u64,
-    /// The one processor on which the thread may run.
-    only: Option<usize>,
+    /// The one processor on which the thread may run, and what has been used of it.
+    only: Option<(usize, &'a AtomicU64)>,
+    pace: Pace,
 }
 
 impl<'a> Stopwatch<'a> {
-    /// For the calling thread, which may run on `allowed`, on all when that is empty.
+    /// For the calling thread, which may run on `allowed`, on all when that is empty. `offset` leads from the monotonic clock to the
+    /// time of the run (ns).
     pub(crate) fn new(
         witness: &'a Witness,
         processors: &'a Processors,
         level: u64,
         allowed: &[usize],
+        offset: i64,
     ) -> Stopwatch<'a> {
         processors.highest.0.fetch_max(level, Ordering::Relaxed);
         let only = if let [only] = allowed { Some(*only) } else { None };
-        Stopwatch { witness, processors, level, only }
+        let only = only.and_then(|only| Some((only, &processors.used.get(only)?.0)));
+        Stopwatch { witness, processors, level, only, pace: Pace::new(offset) }
+    }
+
+    /// The present: the end of a step.
+    #[inline]
+    pub(crate) fn moment(&self) -> Moment {
+        let reading = self.read();
+        Moment { time: self.pace.time(reading.ticks), reading }
+    }
+
+    /// The present after something else than a step, or when the time is held against the clock. It never goes back behind `before`.
+    #[inline]
+    pub(crate) fn fresh(&self, before: Time) -> Moment {
+        let reading = self.read();
+        if self.pace.is_old(reading.ticks) {
+            self.pace.renew();
+        }
+        Moment { time: self.pace.time(reading.ticks).max(before), reading }
+    }
+
+    /// Whether the clock is to be read again.
+    #[inline]
+    pub(crate) fn is_old(&self, moment: &Moment) -> bool {
+        self.pace.is_old(moment.reading.ticks)
     }
 
     /// The beginning or the end of a step. Whom nobody can pre-empt reads the time alone.
     #[inline]
-    pub(crate) fn read(&self) -> Reading {
-        if self.processors.highest.0.load(Ordering::Relaxed) <= self.level {
-            return Reading::of_time();
+    fn read(&self) -> Reading {
+        match self.only {
+            Some((only, line)) => Reading::on(only, line),
+            None if self.processors.highest.0.load(Ordering::Relaxed) <= self.level => Reading::of_time(),
+            None => self.read_any(),
         }
-        self.read_all()
     }
 
-    #[inline]
     fn read_all(&self) -> Reading {
-        self.processors.read(self.only.unwrap_or_else(os::processor))
+        match self.only {
+            Some((only, line)) => Reading::on(only, line),
+            None => self.read_any(),
+        }
+    }
+
+    #[inline(never)]
+    fn read_any(&self) -> Reading {
+        self.processors.read(os::processor())
     }
 
     /// The thread has woken. Nothing for an ordinary one: it does not pre-empt, and may be in the middle of something when others

@@ -88,23 +88,60 @@ unsafe impl<T: Send> Sync for Shared<T> {}
 // SAFETY: as above; the slots hold plain `T`s.
 unsafe impl<T: Send> Send for Shared<T> {}
 
-/// The end that sends.
-pub(crate) struct Sender<T> {
-    shared: Arc<Shared<T>>,
-    position: u64,
+/// What both ends have: the way to the shared memory without looking at the bounds again, and the slot that is their own.
+struct End<T> {
+    entries: *const [AtomicU64],
+    slots: *const [UnsafeCell<T>],
+    /// Always within `entries`.
     index: usize,
+    /// Always within `slots`: every number in the ring is, and ends only exchange them.
     slot: u16,
     displaces: bool,
+    /// Which message it is at, where the sender displaces.
+    position: u64,
+    /// Keeps the memory.
+    _shared: Arc<Shared<T>>,
 }
 
-/// The end that takes.
-pub(crate) struct Receiver<T> {
-    shared: Arc<Shared<T>>,
-    position: u64,
-    index: usize,
-    slot: u16,
-    displaces: bool,
+// SAFETY: the pointers lead into what `_shared` keeps, and that can be sent and shared where `T` can be sent.
+unsafe impl<T: Send> Send for End<T> {}
+// SAFETY: as above; by a shared reference an end only reads entries and its own slot.
+unsafe impl<T: Send + Sync> Sync for End<T> {}
+
+impl<T> End<T> {
+    fn new(shared: Arc<Shared<T>>, slot: u16, displaces: bool) -> End<T> {
+        let (entries, slots) = (&raw const *shared.entries, &raw const *shared.slots);
+        End { entries, slots, index: 0, slot, displaces, position: 0, _shared: shared }
+    }
+
+    #[inline(always)]
+    fn len(&self) -> usize {
+        self.entries.len()
+    }
+
+    #[inline(always)]
+    fn entry(&self) -> &AtomicU64 {
+        // SAFETY: `_shared` keeps the entries, and `index` is within them.
+        unsafe { (&*self.entries).get_unchecked(self.index) }
+    }
+
+    #[inline(always)]
+    fn place(&self) -> &UnsafeCell<T> {
+        // SAFETY: `_shared` keeps the slots, and `slot` is within them.
+        unsafe { (&*self.slots).get_unchecked(usize::from(self.slot)) }
+    }
+
+    #[inline(always)]
+    fn step(&mut self) {
+        self.index = if self.index + 1 == self.len() { 0 } else { self.index + 1 };
+    }
 }
+
+/// The end that sends.
+pub(crate) struct Sender<T>(End<T>);
+
+/// The end that takes.
+pub(crate) struct Receiver<T>(End<T>);
 
 /// A ring for `capacity` messages. With `displaces` the sender may push out the oldest.
 pub(crate) fn ring<T: Default + Send>(capacity: usize, displaces: bool) -> (Sender<T>, Receiver<T>) {
@@ -112,8 +149,8 @@ pub(crate) fn ring<T: Default + Send>(capacity: usize, displaces: bool) -> (Send
     let entries = (0..n).map(|i| AtomicU64::new(empty(i as u16))).collect();
     let slots = (0..n + 2).map(|_| UnsafeCell::new(T::default())).collect();
     let shared = Arc::new(Shared { entries, slots });
-    let sender = Sender { shared: shared.clone(), position: 0, index: 0, slot: n as u16, displaces };
-    (sender, Receiver { shared, position: 0, index: 0, slot: n as u16 + 1, displaces })
+    let sender = Sender(End::new(shared.clone(), n as u16, displaces));
+    (sender, Receiver(End::new(shared, n as u16 + 1, displaces)))
 }
 
 impl<T> Sender<T> {
@@ -121,43 +158,44 @@ impl<T> Sender<T> {
     #[inline]
     pub(crate) fn has_room(&self) -> bool {
         // Whether the receiver is done with the slot that the entry names is seen by `push`.
-        self.shared.entries[self.index].load(Ordering::Relaxed) & FULL == 0
+        self.0.entry().load(Ordering::Relaxed) & FULL == 0
     }
 
     /// Fills the next message in place and sends it. Where there is no room it displaces the oldest if the ring allows that,
     /// else answers [`Pushed::Full`] without calling `fill`.
-    #[inline]
+    #[inline(always)]
     pub(crate) fn push(&mut self, fill: impl FnOnce(&mut T)) -> Pushed {
-        let entry = &self.shared.entries[self.index];
-        if self.displaces {
-            // SAFETY: `self.slot` is this end's own.
-            self.shared.slots[usize::from(self.slot)].with_mut(|place| fill(unsafe { &mut *place }));
-            // Release pairs with the acquire in `Receiver::advance`, for what was filled; acquire pairs with its release,
-            // for the slot that comes back.
-            let ordering = named("ring: displace", Ordering::AcqRel);
-            let old = entry.swap(full(self.slot, self.position), ordering);
-            self.slot = slot_of(old);
-            self.step();
-            if old & FULL == 0 { Pushed::Stored } else { Pushed::Displaced }
-        } else {
-            // Pairs with the release in `Receiver::advance`.
-            let old = entry.load(named("ring: refuse, look", Ordering::Acquire));
-            if old & FULL != 0 {
-                return Pushed::Full;
-            }
-            // SAFETY: `self.slot` is this end's own.
-            self.shared.slots[usize::from(self.slot)].with_mut(|place| fill(unsafe { &mut *place }));
-            // Pairs with the acquire in `Receiver::advance`. An empty entry is the sender's to change.
-            entry.store(full(self.slot, self.position), named("ring: refuse, put", Ordering::Release));
-            self.slot = slot_of(old);
-            self.step();
-            Pushed::Stored
+        if self.0.displaces {
+            return self.push_displacing(fill);
         }
+        let end = &mut self.0;
+        // Pairs with the release in `Receiver::advance`.
+        let old = end.entry().load(named("ring: refuse, look", Ordering::Acquire));
+        if old & FULL != 0 {
+            return Pushed::Full;
+        }
+        // SAFETY: the slot is this end's own.
+        end.place().with_mut(|place| fill(unsafe { &mut *place }));
+        // Pairs with the acquire in `Receiver::advance`. An empty entry is the sender's to change. Nobody laps, so no position.
+        end.entry().store(full(end.slot, 0), named("ring: refuse, put", Ordering::Release));
+        end.slot = slot_of(old);
+        end.step();
+        Pushed::Stored
     }
 
-    fn step(&mut self) {
-        self.position += 1;
-        self.index = if self.index + 1 == self.shared.entries.len() { 0 } else { self.index + 1 };
+    #[inline(never)]
+    fn push_displacing(&mut self, fill: impl FnOnce(&mut T)) -> Pushed {
+        let end = &mut self.0;
+        // SAFETY: the slot is this end's own.
+        end.place().with_mut(|place| fill(unsafe { &mut *place }));
+        // Release pairs with the acquire in `Receiver::advance`, for what was filled; acquire pairs with its release,
+        // for the slot that comes back.
+        let ordering = named("ring: displace", Ordering::AcqRel);
+        let old = end.entry().swap(full(end.slot, end.position), ordering);
+        end.slot = slot_of(old);
+        end.position += 1;
+        end.step();
+        if old & FULL == 0 { Pushed::Stored } else { Pushed::Displaced }
     }
 }
 
@@ -165,63 +203,69 @@ impl<T> Receiver<T> {
     /// Whether a message waits.
     #[inline]
     pub(crate) fn has_message(&self) -> bool {
-        self.shared.entries[self.index].load(Ordering::Relaxed) & FULL != 0
+        self.0.entry().load(Ordering::Relaxed) & FULL != 0
     }
 
     /// Takes the oldest message into this end's slot, where [`current`](Self::current) reads it. Says whether there was one.
     #[inline]
     pub(crate) fn advance(&mut self) -> bool {
+        let end = &mut self.0;
+        // Pairs with the release in `Sender::push`.
+        let seen = end.entry().load(named("ring: take", Ordering::Acquire));
+        if seen & FULL == 0 {
+            return false;
+        }
+        if end.displaces {
+            return self.advance_displaceable(seen);
+        }
+        // A full entry is the receiver's to change where the sender never displaces.
+        end.entry().store(empty(end.slot), named("ring: refuse, give back", Ordering::Release));
+        end.slot = slot_of(seen);
+        end.step();
+        true
+    }
+
+    /// The same where the sender may displace what was just seen.
+    #[inline(never)]
+    fn advance_displaceable(&mut self, mut seen: u64) -> bool {
+        let end = &mut self.0;
         loop {
-            let entry = &self.shared.entries[self.index];
-            // Pairs with the release in `Sender::push`.
-            let seen = entry.load(named("ring: take", Ordering::Acquire));
+            let position = seen >> POSITION_SHIFT;
+            if position != end.position {
+                // The sender has lapped this end: it has displaced everything up to a whole ring before what was seen.
+                end.position = position + 1 - end.len() as u64;
+                end.index = (end.position % end.len() as u64) as usize;
+            } else {
+                // Release pairs with the acquire in `Sender::push`: this end has done reading the slot that it gives back.
+                let ordering = named("ring: displaceable, give back", Ordering::Release);
+                let exchange =
+                    end.entry().compare_exchange(seen, empty(end.slot), ordering, Ordering::Relaxed);
+                if exchange.is_ok() {
+                    end.slot = slot_of(seen);
+                    end.position += 1;
+                    end.step();
+                    return true;
+                }
+            }
+            seen = end.entry().load(named("ring: take", Ordering::Acquire));
             if seen & FULL == 0 {
                 return false;
             }
-            let position = seen >> POSITION_SHIFT;
-            if position != self.position {
-                // The sender has lapped this end: it has displaced everything up to a whole ring before what was seen.
-                self.seek(position + 1 - self.shared.entries.len() as u64);
-                continue;
-            }
-            if self.displaces {
-                // Release pairs with the acquire in `Sender::push`: this end has done reading the slot that it gives back.
-                let ordering = named("ring: displaceable, give back", Ordering::Release);
-                if entry.compare_exchange(seen, empty(self.slot), ordering, Ordering::Relaxed).is_err() {
-                    continue;
-                }
-            } else {
-                // A full entry is the receiver's to change where the sender never displaces.
-                entry.store(empty(self.slot), named("ring: refuse, give back", Ordering::Release));
-            }
-            self.slot = slot_of(seen);
-            self.seek(self.position + 1);
-            return true;
         }
     }
 
     /// The message that was taken last.
     #[inline]
     pub(crate) fn current(&self) -> &T {
-        // SAFETY: `self.slot` is this end's own until the next `advance`, which needs it exclusively.
-        self.shared.slots[usize::from(self.slot)].with(|place| unsafe { &*place })
+        // SAFETY: the slot is this end's own until the next `advance`, which needs it exclusively.
+        self.0.place().with(|place| unsafe { &*place })
     }
 
     /// The same, to be changed or taken out: nobody else sees it.
     #[inline]
     pub(crate) fn current_mut(&mut self) -> &mut T {
         // SAFETY: as in `current`, and this end is borrowed exclusively.
-        self.shared.slots[usize::from(self.slot)].with_mut(|place| unsafe { &mut *place })
-    }
-
-    fn seek(&mut self, position: u64) {
-        let n = self.shared.entries.len();
-        if position == self.position + 1 {
-            self.index = if self.index + 1 == n { 0 } else { self.index + 1 };
-        } else {
-            self.index = (position % n as u64) as usize;
-        }
-        self.position = position;
+        self.0.place().with_mut(|place| unsafe { &mut *place })
     }
 }
 

@@ -5,7 +5,7 @@ use std::sync::Arc;
 use types::cdr::NoElement;
 use types::{AgentId, Category, Duration, Header, Message, Time};
 
-use crate::context::current;
+use crate::context::{Context, current};
 use crate::message_type::MessageType;
 use crate::port::{
     Direction, Envelope, Input, InputCore, Output, OutputCore, Port, PortEnds, PortOptions, PortShape,
@@ -41,7 +41,7 @@ impl<Q: Message<Element = NoElement>, A: Message<Element = NoElement>> Service<Q
 
     /// Takes the next call, to be answered now or in a later step. Calls whose time is over are passed over: nobody waits.
     pub fn take(&mut self) -> Option<(Q, Call)> {
-        let now = current(|context| context.now()).unwrap_or(Time::ZERO);
+        let now = current().map_or(Time::ZERO, Context::now);
         loop {
             let received = self.calls.take()?;
             if received.header().deadline >= now {
@@ -121,7 +121,7 @@ impl<Q: Message<Element = NoElement>, A: Message<Element = NoElement>> Client<Q,
         let Some(place) = self.under_way.iter_mut().find(|place| place.is_none()) else {
             return Err(question);
         };
-        let deadline = current(|context| context.now()).unwrap_or(Time::ZERO).saturating_add(time_out);
+        let deadline = current().map_or(Time::ZERO, Context::now).saturating_add(time_out);
         let marker = self.next;
         let envelope = Envelope { marker, deadline, category: Category::Call, ..Envelope::default() };
         if self.calls.send_as(envelope, question).taken == 0 {
@@ -129,7 +129,9 @@ impl<Q: Message<Element = NoElement>, A: Message<Element = NoElement>> Client<Q,
         }
         self.next = self.next.wrapping_add(1).max(1);
         *place = Some((marker, deadline));
-        current(|context| context.wake_at(deadline));
+        if let Some(context) = current() {
+            context.wake_at(deadline);
+        }
         Ok(Ticket(marker))
     }
 
@@ -145,14 +147,16 @@ impl<Q: Message<Element = NoElement>, A: Message<Element = NoElement>> Client<Q,
                 return Some((Ticket(marker), Reply::Answer(*received)));
             }
         }
-        let now = current(|context| context.now()).unwrap_or(Time::ZERO);
+        let now = current().map_or(Time::ZERO, Context::now);
         let late = self.under_way.iter_mut().find(|place| place.is_some_and(|(_, deadline)| deadline <= now));
         if let Some((marker, _)) = late.and_then(Option::take) {
             return Some((Ticket(marker), Reply::TimeOut));
         }
         // Steps that were asked for are forgotten when another comes first.
-        if let Some(next) = self.under_way.iter().flatten().map(|(_, deadline)| *deadline).min() {
-            current(|context| context.wake_at(next));
+        if let Some(next) = self.under_way.iter().flatten().map(|(_, deadline)| *deadline).min()
+            && let Some(context) = current()
+        {
+            context.wake_at(next);
         }
         None
     }

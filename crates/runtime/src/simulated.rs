@@ -17,6 +17,7 @@ use crate::handover::Running;
 use crate::log::LogThread;
 use crate::os;
 use crate::plan::Plan;
+use crate::processor::Moment;
 use crate::request::{Refusal, Request};
 use crate::router::{Incident, OutsideCall, Router};
 use crate::system::{Ask, Built, CannotRun, Control, Options, Report, Still, Verdict, asks, build};
@@ -225,8 +226,9 @@ impl Player {
                     let core = &mut self.cores[at];
                     core.look_at_door(&self.context, self.now);
                     let Some(job) = core.next(self.now) else { break };
+                    let mut moment = Moment::simulated(self.now);
                     // SAFETY: the core lives in this thread's own array, and nobody else takes it.
-                    let ended = unsafe { Core::run(core, &self.context, job, self.now, None, || true) };
+                    let ended = unsafe { Core::run(core, &self.context, job, &mut moment, None, || true) };
                     steps += 1;
                     if steps > STEPS_AT_ONCE * (1 + self.router.agents_count() as u64) {
                         return Err(self.endless());
@@ -278,8 +280,9 @@ impl Player {
                         agents.push(name);
                     }
                 }
+                let mut moment = Moment::simulated(self.now);
                 // SAFETY: as in `instant`.
-                unsafe { Core::run(core, &self.context, job, self.now, None, || true) };
+                unsafe { Core::run(core, &self.context, job, &mut moment, None, || true) };
                 break;
             }
         }

@@ -19,7 +19,7 @@ pub struct Histogram {
     sum: AtomicU64,
     min: AtomicU64,
     max: AtomicU64,
-    buckets: Box<[AtomicU32]>,
+    buckets: [AtomicU32; BUCKETS],
 }
 
 /// A figure as it is shown, in nanoseconds.
@@ -51,7 +51,7 @@ impl Default for Histogram {
             sum: AtomicU64::new(0),
             min: AtomicU64::new(u64::MAX),
             max: AtomicU64::new(0),
-            buckets: (0..BUCKETS).map(|_| AtomicU32::new(0)).collect(),
+            buckets: [const { AtomicU32::new(0) }; BUCKETS],
         }
     }
 }
@@ -92,38 +92,54 @@ impl Histogram {
 
     /// How many values lie in each of its steps that is not empty: the upper end of the step (ns), and the count.
     pub fn steps(&self) -> Vec<(f64, u32)> {
-        let counts = self.buckets.iter().map(|bucket| bucket.load(Relaxed)).enumerate();
-        counts.filter(|(_, count)| *count > 0).map(|(bucket, count)| (upper(bucket), count)).collect()
+        steps(&[self])
     }
 
     /// What it shows now. Percentiles are the upper ends of steps of an eighth of a doubling.
     pub fn figure(&self) -> Figure {
-        let n = self.n.load(Relaxed);
-        if n == 0 {
-            return Figure::default();
-        }
-        let counts: Vec<u64> = self.buckets.iter().map(|bucket| bucket.load(Relaxed).into()).collect();
-        let counted: u64 = counts.iter().sum();
-        let (min, max) = (self.min.load(Relaxed) as f64, self.max.load(Relaxed) as f64);
-        let at = |share: f64| {
-            let wanted = (share * counted as f64).ceil() as u64;
-            let mut seen = 0;
-            let found = counts.iter().position(|count| {
-                seen += count;
-                seen >= wanted
-            });
-            found.map_or(max, upper).clamp(min, max)
-        };
-        Figure {
-            n,
-            last: self.last.load(Relaxed) as f64,
-            min,
-            mean: self.sum.load(Relaxed) as f64 / n as f64,
-            p50: at(0.5),
-            p99: at(0.99),
-            p999: at(0.999),
-            max,
-        }
+        figure(&[self])
+    }
+}
+
+/// The counts of several histograms as if they were one.
+fn counts(parts: &[&Histogram]) -> Vec<u64> {
+    let count = |bucket: usize| parts.iter().map(|part| u64::from(part.buckets[bucket].load(Relaxed))).sum();
+    (0..BUCKETS).map(count).collect()
+}
+
+fn steps(parts: &[&Histogram]) -> Vec<(f64, u32)> {
+    let counts = counts(parts).into_iter().enumerate();
+    counts.filter(|(_, count)| *count > 0).map(|(bucket, count)| (upper(bucket), count as u32)).collect()
+}
+
+fn figure(parts: &[&Histogram]) -> Figure {
+    let sum = |of: fn(&Histogram) -> &AtomicU64| parts.iter().map(|part| of(part).load(Relaxed)).sum::<u64>();
+    let n = sum(|part| &part.n);
+    if n == 0 {
+        return Figure::default();
+    }
+    let min = parts.iter().map(|part| part.min.load(Relaxed)).min().unwrap_or(0) as f64;
+    let max = parts.iter().map(|part| part.max.load(Relaxed)).max().unwrap_or(0) as f64;
+    let counts = counts(parts);
+    let counted: u64 = counts.iter().sum();
+    let at = |share: f64| {
+        let wanted = (share * counted as f64).ceil() as u64;
+        let mut seen = 0;
+        let found = counts.iter().position(|count| {
+            seen += count;
+            seen >= wanted
+        });
+        found.map_or(max, upper).clamp(min, max)
+    };
+    Figure {
+        n,
+        last: parts.first().map_or(0.0, |part| part.last.load(Relaxed) as f64),
+        min,
+        mean: sum(|part| &part.sum) as f64 / n as f64,
+        p50: at(0.5),
+        p99: at(0.99),
+        p999: at(0.999),
+        max,
     }
 }
 
@@ -154,15 +170,33 @@ pub struct AgentStats {
     pub disagreed: AtomicU64,
     /// How often its steps took or freed memory.
     pub allocations: AtomicU64,
-    /// How long steps used their processor (ns): on the wall clock without what higher executors took from them.
-    pub exec: Histogram,
-    /// How late steps began (ns).
+    /// How long steps used their processor (ns): on the wall clock without what higher executors took from them. Those of `undisturbed`
+    /// are not here.
+    pub(crate) exec: Histogram,
+    /// How late steps began whose time had come (ns). A step that a message made run is released when it begins.
     pub jitter: Histogram,
-    /// From the release to the end of the step (ns).
-    pub response: Histogram,
+    /// From the release to the end of the step (ns), but for those of `undisturbed`.
+    pub(crate) response: Histogram,
+    /// Steps that began when they were released and that nobody interrupted: what they used is what they took (ns).
+    pub(crate) undisturbed: Histogram,
 }
 
 impl AgentStats {
+    /// How long steps used their processor (ns): on the wall clock without what higher executors took from them.
+    pub fn exec(&self) -> Figure {
+        figure(&[&self.exec, &self.undisturbed])
+    }
+
+    /// The same as [`Histogram::steps`].
+    pub fn exec_steps(&self) -> Vec<(f64, u32)> {
+        steps(&[&self.exec, &self.undisturbed])
+    }
+
+    /// From the release to the end of the step (ns).
+    pub fn response(&self) -> Figure {
+        figure(&[&self.response, &self.undisturbed])
+    }
+
     /// A step was held against the thread's clock.
     #[cold]
     pub(crate) fn check(&self, agrees: bool) {

@@ -488,7 +488,7 @@ fn thread_main(
     *cell.granted.lock().unwrap_or_else(PoisonError::into_inner) = Some(granted);
     let (policy, priority) = os::granted();
     let level = if policy == libc::SCHED_FIFO { u64::try_from(priority).unwrap_or(0) } else { 0 };
-    let watch = Stopwatch::new(witness, processors, level, &plan.cpus);
+    let watch = Stopwatch::new(witness, processors, level, &plan.cpus, clock.offset);
     run_core(cell, number, plan, clock, &context, &watch);
 }
 
@@ -529,24 +529,26 @@ fn run_core(
         cell.door.sleep(until);
         woken = watch.wake();
     };
+    let mut at = watch.fresh(Time::ZERO);
     loop {
-        let now = clock.now();
         let job = {
             // SAFETY: the core is this thread's own, and the borrow ends before the step.
             let core = unsafe { &mut *core };
-            core.look_at_door(context, now);
-            core.next(now)
+            if core.look_at_door(context, at.time) || watch.is_old(&at) {
+                at = watch.fresh(at.time);
+            }
+            core.next(at.time)
         };
         if let Some(job) = job {
             let mine = || cell.owner.keeps(number);
             // SAFETY: the core is this thread's own; `mine` says whether it still is after the step.
-            let ended = unsafe { Core::run(core, context, job, now, Some(watch), mine) };
-            match ended {
+            match unsafe { Core::run(core, context, job, &mut at, Some(watch), mine) } {
                 None => return,
                 Some(Ended::AskedToHang(slot)) => {
                     if !hang(cell, number, slot) {
                         return;
                     }
+                    at = watch.fresh(at.time);
                 }
                 Some(_) => {}
             }
@@ -568,6 +570,7 @@ fn run_core(
             }
             _ => sleep(until),
         }
+        at = watch.fresh(at.time);
     }
 }
 

@@ -13,7 +13,7 @@ pub(crate) const ALLOWED: &[(&str, &str)] = &[
     ("crates/runtime/src/allocations.rs", "an allocator in front of another"),
     ("crates/runtime/src/context.rs", "what a thread owns is reached through a pointer to it"),
     (
-        "crates/runtime/src/executor.rs",
+        "crates/runtime/src/executor/step.rs",
         "a step runs while another thread may take over the rest of its executor",
     ),
     ("crates/runtime/src/handover.rs", "the model uses an executor as the real threads do"),

@@ -279,9 +279,10 @@ impl Core {
             Change::Nothing => {}
             Change::OutputFault { end, faulty } => end.set_fault(faulty.as_mut()),
             Change::Send { end, message, envelope } => {
-                context.begin(AgentId::NONE, now, self.number, &*self.ready);
+                context.begin(AgentId::NONE, now, self.number);
                 end.send_prepared(envelope, message.as_ref());
                 context.end();
+                self.mark_woken(context);
             }
             Change::Stop => {
                 let mut seats = core::mem::take(&mut self.seats);
@@ -307,9 +308,10 @@ impl Core {
         if let (Some(new), Some(old)) = (body.as_mut(), seat.body.as_mut())
             && hands_over
         {
-            context.begin(seat.id, now, self.number, &*self.ready);
+            context.begin(seat.id, now, self.number);
             let handed = catch_unwind(AssertUnwindSafe(|| new.take_over(&mut **old)));
             context.end();
+            self.mark_woken(context);
             if let Err(payload) = handed {
                 // The new one dies of it. The old one goes with it: what it knew may be half moved.
                 bump(&seat.stats.panics);
@@ -320,31 +322,34 @@ impl Core {
         self.stop_agent(&mut seat, context, now);
         core::mem::swap(&mut seat.body, body);
         seat.started = false;
-        let has_message = seat.on.iter().any(|input| input.has_message());
+        // What the one before took is not its own doing.
+        let mut has_message = false;
+        for input in &seat.on {
+            has_message |= input.settle().left;
+        }
         self.seats[slot as usize] = Some(seat);
         if has_message {
             self.ready.mark(slot);
         }
     }
 
-    fn stop_agent(&self, seat: &mut Seat, context: &Context, now: Time) {
+    fn stop_agent(&mut self, seat: &mut Seat, context: &Context, now: Time) {
         let Some(body) = seat.body.as_mut() else { return };
         if !seat.started {
             return;
         }
-        context.begin(seat.id, now, self.number, &*self.ready);
+        context.begin(seat.id, now, self.number);
         let mut step = Step { now, deadline: now, agent: seat.id, period: seat.timing.period };
         let stopped = catch_unwind(AssertUnwindSafe(|| body.stop(&mut step)));
         context.end();
+        self.mark_woken(context);
         if stopped.is_err() {
             bump(&seat.stats.panics);
         }
     }
 
     fn reorder(&mut self, order: &mut Vec<u32>, ranks: &mut Vec<u32>, words: &mut Vec<u64>) {
-        let mut from = 0;
-        while let Some(rank) = self.ready.next(from) {
-            from = rank + 1;
+        for rank in self.ready.iter() {
             let slot = self.order[rank as usize];
             if let Some(new) = ranks.get(slot as usize).copied().filter(|rank| *rank != u32::MAX) {
                 words[new as usize / 64] |= 1 << (new % 64);

@@ -10,8 +10,8 @@ use types::cdr::{NoElement, Writer};
 use types::{Header, Message, Priority, Time};
 
 use super::{
-    Direction, InputEnd, OutputEnd, Parcel, Port, PortEnds, PortOptions, PortShape, WireCounts, WireId,
-    count, output_core,
+    Direction, InputEnd, OutputEnd, Parcel, Port, PortEnds, PortOptions, PortShape, Settled, WireCounts,
+    WireId, count, output_core,
 };
 use crate::memory::{Found, Link, Pin, Seat};
 use crate::message_type::MessageType;
@@ -63,6 +63,8 @@ pub(super) struct NewLanes<T: Message> {
 struct InputInner<T: Message> {
     lanes: Vec<Lane<T>>,
     taken: u64,
+    /// How many had been taken after the last step.
+    settled: u64,
     /// The lane that gave the last message, while all are passed over for the newest.
     last: Option<usize>,
 }
@@ -125,11 +127,17 @@ impl<T: Message> InputEnd for InputCore<T> {
     }
 
     fn has_message(&self) -> bool {
-        self.inner().lanes.iter().any(|lane| lane.staged || lane.source.has_message())
+        self.inner().has_message()
     }
 
-    fn taken(&self) -> u64 {
-        self.inner().taken
+    fn settle(&self) -> Settled {
+        let inner = self.inner();
+        let took = inner.taken != inner.settled;
+        inner.settled = inner.taken;
+        if let [Lane { source: Source::Value(receiver), staged, .. }] = &inner.lanes[..] {
+            return Settled { took, left: *staged || receiver.has_message() };
+        }
+        Settled { took, left: inner.has_message() }
     }
 
     fn message_type(&self) -> &'static MessageType {
@@ -201,19 +209,23 @@ impl<T: Message> core::ops::Deref for Received<'_, T> {
 
 impl<T: Message> Input<T> {
     /// The next message in the order of priority, stamp and sender.
-    #[inline]
+    #[inline(always)]
     pub fn take(&mut self) -> Option<Received<'_, T>> {
-        let inner = self.core.as_ref()?.inner();
-        loop {
-            let lane = inner.next()?;
-            // The borrow ends here when the message is gone, and the search goes on.
-            let lane: *const Lane<T> = &raw const inner.lanes[lane];
-            // SAFETY: lanes change only between steps; `&mut self` keeps the message from being taken twice.
-            if let Some(received) = unsafe { &*lane }.current() {
-                inner.taken += 1;
-                return Some(received);
+        let core = self.core.as_ref()?;
+        let inner = core.inner();
+        // Most inputs have one wire with one priority.
+        if let [lane] = &mut inner.lanes[..]
+            && let Source::Value(receiver) = &mut lane.source
+        {
+            if !core::mem::take(&mut lane.staged) && !receiver.advance() {
+                return None;
             }
+            inner.taken += 1;
+            count(&lane.counts.taken);
+            let parcel = receiver.current();
+            return Some(Received { header: &parcel.header, place: Place::Value(&parcel.payload) });
         }
+        core.inner().take()
     }
 
     /// The newest message, after passing over all that came before it; nothing when none has come since the last call.
@@ -261,6 +273,26 @@ impl<T: Message> Input<T> {
 }
 
 impl<T: Message> InputInner<T> {
+    /// The next message of several lanes, or of one that leads into memory.
+    #[inline(never)]
+    fn take(&mut self) -> Option<Received<'_, T>> {
+        loop {
+            let lane = self.next()?;
+            // The borrow ends here when the message is gone, and the search goes on.
+            let lane: *const Lane<T> = &raw const self.lanes[lane];
+            // SAFETY: lanes change only between steps; `&mut self` keeps the message from being taken twice.
+            if let Some(received) = unsafe { &*lane }.current() {
+                self.taken += 1;
+                return Some(received);
+            }
+        }
+    }
+
+    #[inline]
+    fn has_message(&self) -> bool {
+        self.lanes.iter().any(|lane| lane.staged || lane.source.has_message())
+    }
+
     /// The lane whose front is next, staged and marked as given.
     #[inline]
     fn next(&mut self) -> Option<usize> {
@@ -316,7 +348,9 @@ impl<T: Message> Lane<T> {
 
 /// Makes the mailbox of an input of type `T`.
 pub(crate) fn input_core<T: Message>() -> Arc<InputCore<T>> {
-    Arc::new(InputCore { inner: UnsafeCell::new(InputInner { lanes: Vec::new(), taken: 0, last: None }) })
+    Arc::new(InputCore {
+        inner: UnsafeCell::new(InputInner { lanes: Vec::new(), taken: 0, settled: 0, last: None }),
+    })
 }
 
 impl<T: Message> Port for Input<T> {

@@ -18,7 +18,7 @@ use super::{
     Direction, InputEnd, NoSeat, OutputEnd, OutputFault, Parcel, Port, PortEnds, PortOptions, PortShape,
     PreparedWire, Target, WireCounts, WireId, WireSpec, count, input_core,
 };
-use crate::context::current;
+use crate::context::{Context, current};
 use crate::memory::{self, Link, Seat};
 use crate::message_type::{self, MessageType};
 use crate::ring::{self, Overload, Pushed};
@@ -47,6 +47,17 @@ struct OutputInner<T: Message> {
     memory: Option<memory::Writer<T>>,
     /// How it misbehaves, if it does.
     faulty: Option<Box<Faulty<T>>>,
+    /// Whether it has one wire with one priority, which takes all messages as they are: most outputs do.
+    is_plain: bool,
+}
+
+impl<T: Message> OutputInner<T> {
+    /// After a change of what it has.
+    fn changed(&mut self) {
+        self.is_plain = self.memory.is_none()
+            && self.faulty.is_none()
+            && matches!(&self.routes[..], [only] if only.values.len() == 1 && only.takes_all());
+    }
 }
 
 /// The routes behind an output.
@@ -137,13 +148,15 @@ impl<T: Message> OutputEnd for OutputCore<T> {
             core::mem::swap(&mut new.room, &mut inner.routes);
         }
         inner.routes.extend(new.route.take());
+        inner.changed();
     }
 
     fn forget(&self, wire: WireId, into: &mut (dyn Any + Send)) {
         let Some(into) = into.downcast_mut::<Option<Route<T>>>() else { return };
-        let routes = &mut self.inner().routes;
-        if let Some(at) = routes.iter().position(|route| route.wire == wire) {
-            *into = Some(routes.remove(at));
+        let inner = self.inner();
+        if let Some(at) = inner.routes.iter().position(|route| route.wire == wire) {
+            *into = Some(inner.routes.remove(at));
+            inner.changed();
         }
     }
 
@@ -168,6 +181,7 @@ impl<T: Message> OutputEnd for OutputCore<T> {
     fn set_fault(&self, faulty: &mut (dyn Any + Send)) {
         if let Some(faulty) = faulty.downcast_mut::<Option<Box<Faulty<T>>>>() {
             core::mem::swap(&mut self.inner().faulty, faulty);
+            self.inner().changed();
         }
     }
 
@@ -177,7 +191,7 @@ impl<T: Message> OutputEnd for OutputCore<T> {
 
     fn send_prepared(&self, envelope: &Envelope, message: &(dyn Any + Send)) {
         let Some((head, row)) = message.downcast_ref::<(T, Vec<T::Element>)>() else { return };
-        self.send(envelope, |place, room| {
+        self.send(*envelope, |place, room| {
             *place = *head;
             let len = row.len().min(room.len());
             room[..len].copy_from_slice(&row[..len]);
@@ -270,13 +284,16 @@ impl<T: Message> Output<T> {
     }
 
     /// The same with an envelope of its own.
-    #[inline]
+    #[inline(always)]
     pub fn fill_as(
         &mut self,
         envelope: Envelope,
         fill: impl FnOnce(&mut T, &mut [T::Element]) -> usize,
     ) -> Sent {
-        self.core.as_ref().map_or(Sent::default(), |core| core.send(&envelope, fill))
+        match &self.core {
+            Some(core) => core.send(envelope, fill),
+            None => Sent::default(),
+        }
     }
 
     /// Sends as many of the messages as have room on every wire, in order, and gives back those that were not sent.
@@ -324,28 +341,51 @@ impl<T: Message> Output<T> {
 }
 
 impl<T: Message> OutputCore<T> {
-    #[inline]
-    fn send(&self, envelope: &Envelope, fill: impl FnOnce(&mut T, &mut [T::Element]) -> usize) -> Sent {
+    #[inline(always)]
+    fn send(&self, envelope: Envelope, fill: impl FnOnce(&mut T, &mut [T::Element]) -> usize) -> Sent {
         let inner = self.inner();
-        let now = current(|context| context.now()).unwrap_or(Time::ZERO);
-        let header = Header {
-            stamp: envelope.stamp.unwrap_or(now),
-            sequence: inner.sequence,
-            deadline: envelope.deadline,
-            sender: inner.sender,
-            recipient: envelope.recipient,
-            marker: envelope.marker,
-            category: envelope.category,
-            priority: envelope.priority,
+        let context = current();
+        let stamp = match envelope.stamp {
+            Some(stamp) => stamp,
+            None => context.map_or(Time::ZERO, Context::now),
         };
+        let (sequence, sender) = (inner.sequence, inner.sender);
         inner.sequence += 1;
         self.sent.store(inner.sequence, Ordering::Relaxed);
+        let Envelope { deadline, recipient, marker, category, priority, .. } = envelope;
+        if inner.is_plain
+            && self.log_every.load(Ordering::Relaxed) == 0
+            && let [route] = &mut inner.routes[..]
+            && let [(_, ring)] = &mut route.values[..]
+        {
+            let pushed = ring.push(|parcel| {
+                // Word by word: a header that is put together elsewhere and copied here takes longer than the payload.
+                let header = &mut parcel.header;
+                (header.stamp, header.sequence, header.deadline) = (stamp, sequence, deadline);
+                (header.sender, header.recipient, header.marker) = (sender, recipient, marker);
+                (header.category, header.priority) = (category, priority);
+                fill(&mut parcel.payload, &mut []);
+            });
+            return route.account(pushed, Sent::default(), context);
+        }
+        let header = Header { stamp, sequence, deadline, sender, recipient, marker, category, priority };
+        self.send_any(&header, fill, context)
+    }
+
+    #[inline(never)]
+    fn send_any(
+        &self,
+        header: &Header,
+        fill: impl FnOnce(&mut T, &mut [T::Element]) -> usize,
+        context: Option<&Context>,
+    ) -> Sent {
+        let inner = self.inner();
         if inner.faulty.is_some() {
-            return self.send_faulty(inner, &header, fill);
+            return self.send_faulty(inner, header, fill, context);
         }
         match &mut inner.memory {
-            Some(_) => self.send_link(inner, &header, fill),
-            None => self.send_value(inner, &header, fill),
+            Some(_) => self.send_link(inner, header, fill, context),
+            None => self.send_value(inner, header, fill, context),
         }
     }
 
@@ -358,19 +398,21 @@ impl<T: Message> OutputCore<T> {
         }
     }
 
-    fn log(&self, header: &Header, head: &T, row: &[T::Element]) {
-        if self.logs(header.sequence) {
+    fn log(&self, header: &Header, head: &T, row: &[T::Element], context: Option<&Context>) {
+        if let Some(context) = context
+            && self.logs(header.sequence)
+        {
             let number = self.log_number.load(Ordering::Relaxed) as u32;
-            current(|context| context.log(|log| log.message(number, header, head, row)));
+            context.log(|log| log.message(number, header, head, row));
         }
     }
 
-    #[inline]
     fn send_value(
         &self,
         inner: &mut OutputInner<T>,
         header: &Header,
         fill: impl FnOnce(&mut T, &mut [T::Element]) -> usize,
+        context: Option<&Context>,
     ) -> Sent {
         let mut sent = Sent::default();
         if let [route] = &mut inner.routes[..]
@@ -387,15 +429,16 @@ impl<T: Message> OutputCore<T> {
                     fill(place, &mut []);
                 },
                 &mut sent,
+                context,
             );
             return sent;
         }
         let mut message = T::default();
         fill(&mut message, &mut []);
-        self.log(header, &message, &[]);
+        self.log(header, &message, &[], context);
         for route in &mut inner.routes {
             if route.lets_pass(header) {
-                route.put_value(header, |place| *place = message, &mut sent);
+                route.put_value(header, |place| *place = message, &mut sent, context);
             }
         }
         sent
@@ -406,6 +449,7 @@ impl<T: Message> OutputCore<T> {
         inner: &mut OutputInner<T>,
         header: &Header,
         fill: impl FnOnce(&mut T, &mut [T::Element]) -> usize,
+        context: Option<&Context>,
     ) -> Sent {
         let mut sent = Sent::default();
         let Some(mut loan) = inner.memory.as_mut().and_then(memory::Writer::loan) else {
@@ -413,11 +457,11 @@ impl<T: Message> OutputCore<T> {
         };
         let (head, row) = loan.parts();
         let len = fill(head, row).min(row.len());
-        self.log(header, head, &row[..len]);
+        self.log(header, head, &row[..len], context);
         let link = loan.publish(*header, len);
         for route in &mut inner.routes {
             if route.lets_pass(header) {
-                route.put_link(header, link, &mut sent);
+                route.put_link(header, link, &mut sent, context);
             }
         }
         sent
@@ -430,6 +474,7 @@ impl<T: Message> OutputCore<T> {
         inner: &mut OutputInner<T>,
         header: &Header,
         fill: impl FnOnce(&mut T, &mut [T::Element]) -> usize,
+        context: Option<&Context>,
     ) -> Sent {
         // A pure function of the message's number: the same run misbehaves in the same way.
         let draws = Stream::new(0, "output fault").sample(inner.sender.0.into()).sample(header.sequence);
@@ -444,8 +489,8 @@ impl<T: Message> OutputCore<T> {
                 len
             };
             sent = match inner.memory {
-                Some(_) => self.send_link(inner, &header, put),
-                None => self.send_value(inner, &header, put),
+                Some(_) => self.send_link(inner, &header, put, context),
+                None => self.send_value(inner, &header, put, context),
             };
         }
         inner.faulty = Some(faulty);
@@ -454,6 +499,10 @@ impl<T: Message> OutputCore<T> {
 }
 
 impl<T: Message> Route<T> {
+    fn takes_all(&self) -> bool {
+        self.filter.every <= 1 && Filter { every: 0, ..self.filter } == Filter::ALL
+    }
+
     #[inline]
     fn lets_pass(&mut self, header: &Header) -> bool {
         if !self.filter.passes(header) {
@@ -467,7 +516,13 @@ impl<T: Message> Route<T> {
     }
 
     #[inline]
-    fn put_value(&mut self, header: &Header, fill: impl FnOnce(&mut T), sent: &mut Sent) {
+    fn put_value(
+        &mut self,
+        header: &Header,
+        fill: impl FnOnce(&mut T),
+        sent: &mut Sent,
+        context: Option<&Context>,
+    ) {
         let pushed = match lane_for(&mut self.values, header.priority) {
             Some(ring) => ring.push(|parcel| {
                 parcel.header = *header;
@@ -475,38 +530,41 @@ impl<T: Message> Route<T> {
             }),
             None => Pushed::Full,
         };
-        self.account(pushed, sent);
+        *sent = self.account(pushed, *sent, context);
     }
 
-    fn put_link(&mut self, header: &Header, link: Link, sent: &mut Sent) {
+    fn put_link(&mut self, header: &Header, link: Link, sent: &mut Sent, context: Option<&Context>) {
         let pushed = match lane_for(&mut self.links, header.priority) {
             Some(ring) => ring.push(|parcel| *parcel = Parcel { header: *header, payload: link }),
             None => Pushed::Full,
         };
-        self.account(pushed, sent);
+        *sent = self.account(pushed, *sent, context);
     }
 
     #[inline]
-    fn account(&mut self, pushed: Pushed, sent: &mut Sent) {
+    fn account(&mut self, pushed: Pushed, mut sent: Sent, context: Option<&Context>) -> Sent {
         match pushed {
+            Pushed::Stored => {}
+            Pushed::Displaced => count(&self.counts.dropped),
             Pushed::Full if self.overload == Overload::Refuse => {
                 count(&self.counts.refused);
                 sent.refused += 1;
-                return;
+                return sent;
             }
             Pushed::Full => {
                 count(&self.counts.dropped);
-                return;
+                return sent;
             }
-            Pushed::Displaced => count(&self.counts.dropped),
-            Pushed::Stored => {}
         }
         count(&self.counts.sent);
         sent.taken += 1;
-        if self.target.wakes {
-            let target = &self.target;
-            current(|context| context.wake(target.executor, target.slot, &target.door));
+        let target = &self.target;
+        if target.wakes
+            && let Some(context) = context
+        {
+            context.wake(target.executor, target.slot, &target.door);
         }
+        sent
     }
 }
 
@@ -537,6 +595,7 @@ pub(crate) fn output_core<T: Message>(options: &PortOptions, seats: usize) -> Ar
             routes: Vec::new(),
             memory,
             faulty: None,
+            is_plain: false,
         }),
         shared,
         rows,

@@ -68,10 +68,10 @@ impl Router {
                 disagreed: stats.disagreed.load(Relaxed),
                 allocations: stats.allocations.load(Relaxed),
             },
-            exec: stats.exec.figure(),
+            exec: stats.exec(),
             jitter: stats.jitter.figure(),
-            response: stats.response.figure(),
-            exec_steps: stats.exec.steps(),
+            response: stats.response(),
+            exec_steps: stats.exec_steps(),
             jitter_steps: stats.jitter.steps(),
         }
     }
