@@ -26,12 +26,17 @@ const LINE: u64 = 4 << 32;
 struct Shared {
     words: Box<[UnsafeCell<u64>]>,
     /// Words written since the start; the writer's.
-    written: AtomicU64,
+    written: Line,
     /// Words read since the start; the reader's.
-    read: AtomicU64,
+    read: Line,
     dropped: AtomicU64,
     closed: AtomicBool,
 }
+
+/// A counter with a line of memory of its own: the two ends stand on two processors, and would take it from one another.
+#[derive(Default)]
+#[repr(align(128))]
+struct Line(AtomicU64);
 
 // SAFETY: words between `read` and `written` are the reader's, the others the writer's; the two counters pass them on with
 // release and acquire.
@@ -43,6 +48,10 @@ unsafe impl Send for Shared {}
 pub(crate) struct Writer {
     shared: Arc<Shared>,
     written: u64,
+    /// How many words had been read when that was last looked at: only when there seems to be no room, since the look is dear.
+    read: u64,
+    /// One less than the number of words, which is a power of two.
+    mask: usize,
     waits: bool,
 }
 
@@ -51,17 +60,18 @@ pub(crate) struct Reader {
     shared: Arc<Shared>,
 }
 
-/// Makes a ring of so many words. A writer that `waits` never drops.
+/// Makes a ring of so many words, or of the next power of two. A writer that `waits` never drops.
 pub(crate) fn ring(words: usize, waits: bool) -> (Writer, Reader) {
-    let words = (0..words).map(|_| UnsafeCell::new(0)).collect();
+    let words: Box<[_]> = (0..words.next_power_of_two()).map(|_| UnsafeCell::new(0)).collect();
+    let mask = words.len() - 1;
     let shared = Arc::new(Shared {
         words,
-        written: AtomicU64::new(0),
-        read: AtomicU64::new(0),
+        written: Line::default(),
+        read: Line::default(),
         dropped: AtomicU64::new(0),
         closed: AtomicBool::new(false),
     });
-    (Writer { shared: shared.clone(), written: 0, waits }, Reader { shared })
+    (Writer { shared: shared.clone(), written: 0, read: 0, mask, waits }, Reader { shared })
 }
 
 /// What stands in the log.
@@ -107,17 +117,32 @@ const HEADER_WORDS: usize = size_of::<Header>().div_ceil(WORD);
 
 impl Writer {
     /// Finds room for a record of `len` words that lie together. Nothing when there is none and the writer does not wait.
+    #[inline]
     fn room(&mut self, len: usize) -> Option<usize> {
-        let words = self.shared.words.len();
+        let words = self.mask + 1;
+        let at = self.written as usize & self.mask;
+        // Most of the time there is room behind the last record, and was when the reader was last looked at.
+        if at + len <= words && self.written + len as u64 - self.read <= words as u64 {
+            return Some(at);
+        }
+        self.find_room(len)
+    }
+
+    #[inline(never)]
+    fn find_room(&mut self, len: usize) -> Option<usize> {
+        let words = self.mask + 1;
         if len >= words / 2 {
             self.shared.dropped.fetch_add(1, Ordering::Relaxed);
             return None;
         }
-        let at = self.written as usize % words;
+        let at = self.written as usize & self.mask;
         let skipped = if at + len > words { words - at } else { 0 };
-        // Pairs with the release in `Reader::drain`.
-        while self.written + (skipped + len) as u64 - self.shared.read.load(Ordering::Acquire) > words as u64
-        {
+        loop {
+            // Pairs with the release in `Reader::drain`.
+            self.read = self.shared.read.0.load(Ordering::Acquire);
+            if self.written + (skipped + len) as u64 - self.read <= words as u64 {
+                break;
+            }
             if !self.waits || self.shared.closed.load(Ordering::Relaxed) {
                 self.shared.dropped.fetch_add(1, Ordering::Relaxed);
                 return None;
@@ -128,7 +153,7 @@ impl Writer {
             self.put(at, SKIP | skipped as u64);
             self.written += skipped as u64;
         }
-        Some(self.written as usize % words)
+        Some(self.written as usize & self.mask)
     }
 
     #[inline]
@@ -150,10 +175,11 @@ impl Writer {
         unsafe { core::ptr::copy_nonoverlapping(from, self.shared.words[at].get().cast::<u8>(), bytes) };
     }
 
+    #[inline]
     fn publish(&mut self, len: usize) {
         self.written += len as u64;
         // Pairs with the acquire in `Reader::drain`.
-        self.shared.written.store(self.written, Ordering::Release);
+        self.shared.written.0.store(self.written, Ordering::Release);
     }
 
     /// Writes a message.
@@ -206,9 +232,9 @@ impl Writer {
 impl Reader {
     /// Hands every record that waits to `each`. Says how many there were.
     pub(crate) fn drain(&mut self, mut each: impl FnMut(Record<'_>)) -> usize {
-        let mut read = self.shared.read.load(Ordering::Relaxed);
+        let mut read = self.shared.read.0.load(Ordering::Relaxed);
         // Pairs with the release in `Writer::publish`.
-        let written = self.shared.written.load(Ordering::Acquire);
+        let written = self.shared.written.0.load(Ordering::Acquire);
         let mut records = 0;
         while read < written {
             let at = read as usize % self.shared.words.len();
@@ -220,7 +246,7 @@ impl Reader {
             }
             read += len as u64;
             // Pairs with the acquire in `Writer::room`.
-            self.shared.read.store(read, Ordering::Release);
+            self.shared.read.0.store(read, Ordering::Release);
         }
         records
     }
