@@ -276,8 +276,9 @@ impl<T: Message> Output<T> {
         })
     }
 
-    /// Sends a message that is filled in place. `fill` gets the head and the whole room for the row, and says how much of the
-    /// row is in use. What was in the place before is some earlier message, or the default.
+    /// Sends a message that is filled in place. `fill` gets the head and the whole room for the row, and says how much of the row is in
+    /// use. What was in the place before is some earlier message, or the default. A large message that nobody would hear, as the log
+    /// takes only some, is not filled.
     #[inline]
     pub fn send_with(&mut self, fill: impl FnOnce(&mut T, &mut [T::Element]) -> usize) -> Sent {
         self.fill_as(Envelope::default(), fill)
@@ -322,11 +323,11 @@ impl<T: Message> Output<T> {
         })
     }
 
-    /// Whether anybody listens: a wire, or the log. What nobody hears need not be computed.
+    /// Whether anybody listens: a wire, or the log, be it to one message of many. What nobody hears need not be computed.
     #[inline]
     pub fn has_listeners(&self) -> bool {
         self.core.as_ref().is_some_and(|core| {
-            !core.inner().routes.is_empty() || core.log_every.load(Ordering::Relaxed) == 1
+            !core.inner().routes.is_empty() || core.log_every.load(Ordering::Relaxed) != 0
         })
     }
 
@@ -452,6 +453,10 @@ impl<T: Message> OutputCore<T> {
         context: Option<&Context>,
     ) -> Sent {
         let mut sent = Sent::default();
+        // Of large messages the log takes only some: the others need not be made for it.
+        if inner.routes.is_empty() && !self.logs(header.sequence) {
+            return sent;
+        }
         let Some(mut loan) = inner.memory.as_mut().and_then(memory::Writer::loan) else {
             return sent;
         };
@@ -478,9 +483,11 @@ impl<T: Message> OutputCore<T> {
     ) -> Sent {
         // A pure function of the message's number: the same run misbehaves in the same way.
         let draws = Stream::new(0, "output fault").sample(inner.sender.0.into()).sample(header.sequence);
-        let Some(mut faulty) = inner.faulty.take() else { return Sent::default() };
+        let Some(faulty) = inner.faulty.take() else { return Sent::default() };
         let mut sent = Sent::default();
-        if let Some(kept) = faulty.in_place_of(header.stamp, draws, fill) {
+        // It goes back to its place also when `fill` panics.
+        let mut faulty = Restored { faulty: Some(faulty), place: &raw mut inner.faulty };
+        if let Some(kept) = faulty.get().and_then(|faulty| faulty.in_place_of(header.stamp, draws, fill)) {
             let header = Header { stamp: kept.stamp, ..*header };
             let put = |place: &mut T, room: &mut [T::Element]| {
                 *place = kept.head;
@@ -493,8 +500,26 @@ impl<T: Message> OutputCore<T> {
                 None => self.send_value(inner, &header, put, context),
             };
         }
-        inner.faulty = Some(faulty);
         sent
+    }
+}
+
+/// The fault of an output on its way through a send.
+struct Restored<T: Message> {
+    faulty: Option<Box<Faulty<T>>>,
+    place: *mut Option<Box<Faulty<T>>>,
+}
+
+impl<T: Message> Restored<T> {
+    fn get(&mut self) -> Option<&mut Faulty<T>> {
+        self.faulty.as_deref_mut()
+    }
+}
+
+impl<T: Message> Drop for Restored<T> {
+    fn drop(&mut self) {
+        // SAFETY: the place is in the output, which is borrowed for longer than the send lasts; nothing else goes there meanwhile.
+        unsafe { *self.place = self.faulty.take() };
     }
 }
 
