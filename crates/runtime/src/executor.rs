@@ -18,7 +18,6 @@ pub(crate) use change::{Answer, Change, Link, heaps_for};
 
 use self::ready::ReadySet;
 use crate::agent::{Body, Fault};
-use crate::context::Context;
 use crate::door::{CHANGES, Door};
 use crate::handover::Running;
 use crate::os;
@@ -27,7 +26,6 @@ use crate::processor::{Checks, rate};
 use crate::ring::{self, ring};
 use crate::stats::{AgentStats, bump};
 use crate::sync::Ordering;
-use crate::turn::Turn;
 
 /// When an agent runs.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -57,6 +55,8 @@ pub(crate) struct Seat {
     pub last_step: Time,
     pub started: bool,
     pub fault: StepFault,
+    /// Whether the agent is in a step that does not return. Its ends may be in use there, so nobody touches them; it gets others.
+    pub lost: bool,
 }
 
 /// How an agent misbehaves on request.
@@ -84,6 +84,8 @@ pub enum Cause {
     Panic(String),
     /// Its step did not return.
     Hang,
+    /// It did not return from its stop, or from taking over.
+    Stop,
 }
 
 impl core::fmt::Display for Cause {
@@ -92,6 +94,7 @@ impl core::fmt::Display for Cause {
             Cause::Fault(fault) => write!(f, "fault: {fault}"),
             Cause::Panic(said) => write!(f, "panic: {said}"),
             Cause::Hang => f.write_str("its step did not return"),
+            Cause::Stop => f.write_str("it did not return from its stop, or from taking over"),
         }
     }
 }
@@ -102,6 +105,7 @@ pub(crate) enum RawCause {
     Fault(Fault),
     Panic(crate::context::PanicRecord, Box<dyn Any + Send>),
     Hang,
+    Stop,
 }
 
 /// An agent that is to run, and why.
@@ -130,8 +134,9 @@ pub(crate) struct Core {
     pub door: Arc<Door>,
     pub running: Arc<Running>,
     changes: ring::Receiver<Option<(u64, Change)>>,
-    turn: Arc<Turn>,
     answers: ring::Sender<Option<Answer>>,
+    /// The number of the change that is being committed.
+    changing: Option<u64>,
     /// Nanoseconds in a tick, as [`scaled`](crate::processor::scaled) takes it.
     rate: u64,
     checks: Checks,
@@ -160,7 +165,6 @@ impl Core {
         let (answers, answer_out) = ring(UNDER_WAY, false);
         let door = Arc::new(Door::new());
         let running = Arc::new(Running::default());
-        let turn = Arc::new(Turn::default());
         let core = Core {
             number,
             seats: Vec::new(),
@@ -172,13 +176,13 @@ impl Core {
             door: door.clone(),
             running: running.clone(),
             changes,
-            turn: turn.clone(),
             answers,
+            changing: None,
             rate: rate(os::nanos_per_tick()),
             checks: Checks::default(),
             stalls: 0,
         };
-        (core, Link { changes: change_in, answers: answer_out, turn, given: 0, door, running })
+        (core, Link { changes: change_in, answers: answer_out, given: 0, door, running })
     }
 
     /// When the next agent is due by the clock.
@@ -193,14 +197,14 @@ impl Core {
         !self.door.is_rung() && self.next_release() > now && self.due.is_empty() && self.ready.is_empty()
     }
 
-    /// Takes what others have rung for, and serves changes. Says whether there were any, which took time.
+    /// Takes what others have rung for. Says whether changes wait, which are then to be served.
     #[inline]
-    pub(crate) fn look_at_door(&mut self, context: &Context, now: Time) -> bool {
-        self.door.is_rung() && self.answer_door(context, now)
+    pub(crate) fn look_at_door(&mut self) -> bool {
+        self.door.is_rung() && self.answer_door()
     }
 
     #[inline(never)]
-    fn answer_door(&mut self, context: &Context, now: Time) -> bool {
+    fn answer_door(&mut self) -> bool {
         let bits = self.door.take();
         for slot in 0..self.seats.len() as u32 {
             if bits & crate::door::bit_of(slot) != 0
@@ -210,11 +214,7 @@ impl Core {
                 self.ready.mark(slot);
             }
         }
-        let changes = bits & CHANGES != 0;
-        if changes {
-            self.serve_changes(context, now);
-        }
-        changes
+        bits & CHANGES != 0
     }
 
     /// Finds ready agents by looking into the mailboxes: after a hand-over, when nobody knows what was rung.
@@ -330,13 +330,18 @@ impl Core {
         self.releases.push(Reverse((time, slot)));
     }
 
-    /// Takes an agent that does not come back from its step for dead. Its body is lost to the step; in simulated time it is
-    /// still here, and goes to the control side.
+    /// Takes an agent that does not come back from its step, or its stop, for dead. Its body is lost to that; in simulated time it
+    /// is still here, and goes to the control side. From here on nobody touches its ends: the thread that lost it may.
     pub(crate) fn give_up(&mut self, slot: u32, now: Time) {
         let Some(seat) = self.seats.get_mut(slot as usize).and_then(Option::as_mut) else { return };
         bump(&seat.stats.hangs);
-        let died =
-            Answer::Died { slot, id: seat.id, time: now, cause: RawCause::Hang, body: seat.body.take() };
+        seat.lost = true;
+        seat.on.clear();
+        let cause = if self.changing.is_some() { RawCause::Stop } else { RawCause::Hang };
+        let died = Answer::Died { slot, id: seat.id, time: now, cause, body: seat.body.take() };
         self.answer(died);
+        if let Some(number) = self.changing.take() {
+            self.answer(Answer::Lost(number, None));
+        }
     }
 }

@@ -76,7 +76,6 @@ mod sync;
 mod system;
 mod tap;
 mod trace;
-mod turn;
 mod wall;
 mod witness;
 
@@ -100,7 +99,8 @@ pub use port::{
     Received, Sent, WireCounts, WireId,
 };
 pub use request::{
-    AgentState, AgentView, Counts, ExecutorView, FaultKind, PortView, Refusal, Request, SystemView, WireView,
+    AgentState, AgentView, Counts, ExecutorView, FaultKind, PortView, Refusal, Request, SystemView,
+    WireTotals, WireView,
 };
 pub use ring::{MOST_MESSAGES, Overload};
 pub use router::{Incident, ServiceShape, robot_wires};

@@ -206,8 +206,8 @@ pub(crate) trait OutputEnd: Any + Send + Sync {
         routes: usize,
         lanes: usize,
     ) -> Result<PreparedWire, NoSeat>;
-    /// Says whose output it is.
-    fn set_sender(&self, sender: AgentId);
+    /// Says whose output it is, and with which sequence number it goes on. Nobody else may have it yet.
+    fn set_sender(&self, sender: AgentId, sequence: u64);
     /// Adds a route, using the room that comes with it.
     fn add_route(&self, route: &mut (dyn Any + Send));
     /// Takes the route of a wire out, to be freed elsewhere.

@@ -1,12 +1,14 @@
 //! What can be asked of a running system, and what it answers.
 
+use core::sync::atomic::Ordering::Relaxed;
+
 use types::params::Fields;
 use types::value::{Table, Value};
 use types::{AgentId, Duration, Time};
 
 use crate::executor::StepFault;
 use crate::plan::{AgentPlan, WireFilter, WirePlan};
-use crate::port::{Direction, OutputFault};
+use crate::port::{Direction, OutputFault, WireCounts};
 use crate::ring::Overload;
 use crate::stats::Figure;
 
@@ -288,7 +290,8 @@ pub struct Counts {
     pub checked: u64,
     /// Of those, the ones for which it said something else.
     pub disagreed: u64,
-    /// How often its steps took or freed memory; zero where nobody watches that.
+    /// How often its steps took or freed memory; zero where nobody watches that. What it takes once in its life, when it starts, takes
+    /// over from another or stops, is not counted, here or elsewhere.
     pub allocations: u64,
 }
 
@@ -334,6 +337,43 @@ pub struct WireView {
     pub expired: u64,
 }
 
+/// What went over wires.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct WireTotals {
+    /// Messages put into them.
+    pub sent: u64,
+    /// Messages that were displaced or dropped, or lay in a wire that was cut and were never taken.
+    pub dropped: u64,
+    /// Messages that were given back.
+    pub refused: u64,
+    /// Messages taken out of them.
+    pub taken: u64,
+    /// Links that were read too late.
+    pub expired: u64,
+}
+
+impl WireTotals {
+    pub(crate) fn of(counts: &WireCounts) -> WireTotals {
+        WireTotals {
+            sent: counts.sent.load(Relaxed),
+            dropped: counts.dropped.load(Relaxed),
+            refused: counts.refused.load(Relaxed),
+            taken: counts.taken.load(Relaxed),
+            expired: counts.expired.load(Relaxed),
+        }
+    }
+}
+
+impl core::ops::AddAssign for WireTotals {
+    fn add_assign(&mut self, more: WireTotals) {
+        self.sent += more.sent;
+        self.dropped += more.dropped;
+        self.refused += more.refused;
+        self.taken += more.taken;
+        self.expired += more.expired;
+    }
+}
+
 /// What a running system says of an executor.
 #[derive(Clone, Debug)]
 pub struct ExecutorView {
@@ -360,4 +400,6 @@ pub struct SystemView {
     pub agents: Vec<AgentView>,
     /// Its wires.
     pub wires: Vec<WireView>,
+    /// What went over wires that are cut. What is on its way still is not among it.
+    pub past: WireTotals,
 }

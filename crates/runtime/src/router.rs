@@ -1,35 +1,43 @@
 //! The registry of agents, ports and wires: who is there, who talks to whom. Never on a message's path.
 //!
-//! A change is prepared here (checked, allocated), committed by each executor concerned between two of its steps, and retired
-//! here once all have answered. The order is fixed: the receiver joins before the sender adds; the sender forgets before the
-//! receiver leaves, and a receiver that is not drained yet is asked again.
+//! What is asked for is first *staged*: checked and allocated, and written into the registry, from which it can still be taken back
+//! without anybody having noticed. When all of it is right and all executors concerned answer, it is decided, and what it takes is given to
+//! them, one thing after another ([`script`]); each commits its part between two of its steps, and what comes back is freed here. From
+//! then on the registry is the truth that the executors follow: one that does not answer does its part when it does.
+//!
+//! The order is fixed: the receiver joins before the sender adds; the sender forgets before the receiver leaves, and a receiver that is
+//! not drained yet is asked again.
 
 mod agents;
 mod calls;
-mod changes;
 mod deaths;
+mod order;
 mod requests;
+mod script;
+mod staged;
 mod view;
 mod wires;
 
+use std::collections::{BTreeMap, BTreeSet, HashMap};
 use std::sync::Arc;
 
 use types::value::Table;
-use types::{AgentId, Duration, Priority, Time};
+use types::{AgentId, Duration, Filter, Priority, Time};
 
 use crate::agent::{AgentType, Body, Registry};
-use crate::executor::{Answer, Link, Timing};
+use crate::executor::{Link, StepFault, Timing};
 use crate::log::{LogChoice, LogShared};
 use crate::names::Directory;
 use crate::plan::{AgentPlan, ExecutorPlan, WireFilter, WirePlan};
-use crate::port::{Direction, InputEnd, OutputEnd, PortEnds, WireCounts, WireId};
-use crate::request::{AgentState, Refusal};
+use crate::port::{Direction, InputEnd, OutputEnd, OutputFault, PortEnds, WireCounts, WireId};
+use crate::request::{AgentState, Refusal, WireTotals};
 use crate::ring::Overload;
 use crate::stats::AgentStats;
 use crate::tap::Tap;
 
 pub(crate) use calls::OutsideCall;
 pub use calls::ServiceShape;
+pub(crate) use staged::Staged;
 
 /// Readers for which an output's memory has room besides those in the plan.
 const SPARE_SEATS: usize = 8;
@@ -37,30 +45,47 @@ const SPARE_SEATS: usize = 8;
 /// Unless the plan says otherwise, a step hangs when it takes four times its deadline, and at least this.
 const LEAST_HANG: Duration = Duration::millis(50);
 
-/// How the router gets an executor to serve its changes: by waking its thread and waiting, or by doing it on the spot.
+/// How the router gets an executor to serve its changes: by waking its thread, or by doing it on the spot.
 pub(crate) trait Fabric {
-    /// Makes the executor serve what was given to it, or gives it time to. Says whether to go on waiting.
-    fn pump(&mut self, executor: usize) -> bool;
-    /// The executor has answered.
-    fn answered(&mut self) {}
+    /// Tells an executor that changes wait for it.
+    fn ring(&mut self, executor: usize);
+    /// Gives the executors some time. Says whether to go on waiting.
+    fn wait(&mut self) -> bool;
 }
 
 struct Known {
     id: AgentId,
+    /// How many were added before it.
+    added: u64,
     kind: AgentType,
     plan: AgentPlan,
     params: Table,
     executor: usize,
     slot: u32,
     ends: Vec<PortEnds>,
+    /// For each port, how many rings lead into and out of it, those that are being cut among them.
+    rings: Vec<Rings>,
+    /// The wires that touch it.
+    wires: BTreeSet<WireId>,
     stats: Arc<AgentStats>,
     timing: Timing,
+    fault: StepFault,
+    output_faults: Vec<OutputFault>,
     state: AgentState,
     restart_at: Time,
+    /// Whether its executor has been told to start it again, and has not answered yet.
+    starting: bool,
     deaths: Vec<Time>,
     last_death: Option<String>,
     /// Built ahead, so that a restart waits for nothing.
     spare: Option<Box<dyn Body>>,
+}
+
+/// How many rings lead into and out of a port.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+struct Rings {
+    into: usize,
+    out: usize,
 }
 
 impl Known {
@@ -73,33 +98,42 @@ impl Known {
         }
         priorities
     }
+
+    /// The inputs that make it run.
+    fn on(&self) -> Vec<Arc<dyn InputEnd>> {
+        let inputs = (0..self.ends.len()).filter(|port| self.wakes(*port));
+        inputs.filter_map(|port| self.ends[port].input.clone()).collect()
+    }
+
+    /// One ring more or less leads into a port.
+    fn joined(&mut self, port: usize, by: isize) {
+        let into = &mut self.rings[port].into;
+        *into = into.saturating_add_signed(by);
+    }
+
+    /// One ring more or less leads out of a port.
+    fn routed(&mut self, port: usize, by: isize) {
+        let out = &mut self.rings[port].out;
+        *out = out.saturating_add_signed(by);
+    }
+
+    /// Whether a message for this port makes it run. Answers do, wherever they come from.
+    fn wakes(&self, port: usize) -> bool {
+        let port = &self.kind.ports[port];
+        port.shape.direction == Direction::Client || self.plan.on.iter().any(|on| on == port.name)
+    }
 }
 
-/// What an executor made of a change.
-enum Committed {
-    Done,
-    /// The wire has messages still.
-    NotDrained,
-}
+/// A port of an agent.
+type PortId = (AgentId, usize);
 
-/// An end of a wire that is no more, which an executor did not let go of because it did not answer.
-struct Owed {
-    executor: usize,
-    wire: WireId,
-    end: OwedEnd,
-}
-
-enum OwedEnd {
-    /// Somebody sends still, into a mailbox that nobody reads.
-    Forget(Arc<dyn OutputEnd>),
-    /// Nobody sends any more.
-    Leave(Arc<dyn InputEnd>),
-}
-
+#[derive(Clone)]
 struct Wire {
     id: WireId,
-    from: (AgentId, usize),
-    to: (AgentId, usize),
+    /// Its number in the ports, which is another one when an agent that is lost gets new ports.
+    ring: WireId,
+    from: PortId,
+    to: PortId,
     /// The wire of the answers, for a client and a service.
     partner: Option<WireId>,
     /// Whether it is the partner of another, and so is not shown.
@@ -107,7 +141,11 @@ struct Wire {
     depth: usize,
     overload: Overload,
     filter: WireFilter,
+    /// The same with the number of the recipient.
+    passes: Filter,
     counts: Arc<WireCounts>,
+    /// What was counted before it had its present rings.
+    past: WireTotals,
 }
 
 /// An executor as the router knows it.
@@ -116,7 +154,10 @@ pub(crate) struct ExecutorKnown {
     pub link: Link,
     /// The scheduling that the thread got, once it runs.
     pub granted: String,
-    slots: Vec<bool>,
+    /// Who sits where. A place is free when the executor has let go of it.
+    slots: Vec<Option<AgentId>>,
+    /// The number of the last change to which it has answered.
+    answered: u64,
 }
 
 /// Something that the supervisor did or saw, to be told to people.
@@ -134,10 +175,11 @@ pub struct Incident {
 pub(crate) struct Router {
     name: String,
     registry: Registry,
-    agents: Vec<Known>,
-    wires: Vec<Wire>,
+    agents: BTreeMap<AgentId, Known>,
+    names: HashMap<String, AgentId>,
+    wires: BTreeMap<WireId, Wire>,
     pub executors: Vec<ExecutorKnown>,
-    next_agent: u32,
+    added: u64,
     next_wire: u32,
     /// The number of the last caller from outside.
     next_caller: u32,
@@ -146,10 +188,15 @@ pub(crate) struct Router {
     pub incidents: Vec<Incident>,
     /// At least as many as wait to be started again: who is dead is looked for only when somebody is.
     restarting: usize,
-    /// Deaths that were read while waiting for something else.
-    died: Vec<(usize, Answer)>,
-    /// What executors owe from a time when they did not answer.
-    owed: Vec<Owed>,
+    /// What was decided and is not done yet, in the order of the decisions.
+    scripts: Vec<script::Script>,
+    next_script: u64,
+    /// Rings whose receivers have messages to take yet.
+    leaving: Vec<script::Leaving>,
+    /// What went over wires that are cut.
+    past: WireTotals,
+    /// The time of the request that is being done, or of the last look.
+    now: Time,
     log: LogChoice,
     pub log_shared: Arc<LogShared>,
     robots: Vec<String>,
@@ -169,17 +216,21 @@ impl Router {
         Router {
             name: name.to_owned(),
             registry,
-            agents: Vec::new(),
-            wires: Vec::new(),
+            agents: BTreeMap::new(),
+            names: HashMap::new(),
+            wires: BTreeMap::new(),
             executors,
-            next_agent: 0,
+            added: 0,
             next_wire: 0,
             next_caller: AgentId::NONE.0,
             calls: Vec::new(),
             incidents: Vec::new(),
             restarting: 0,
-            died: Vec::new(),
-            owed: Vec::new(),
+            scripts: Vec::new(),
+            next_script: 0,
+            leaving: Vec::new(),
+            past: WireTotals::default(),
+            now: Time::ZERO,
             log: LogChoice::default(),
             log_shared: LogShared::new(),
             robots,
@@ -223,41 +274,55 @@ impl Router {
 
     /// How long a step of the agent in this slot may last before it is taken for one that does not return.
     pub(crate) fn hang_limit(&self, executor: usize, slot: u32) -> Duration {
-        let known = self.agents.iter().find(|known| known.executor == executor && known.slot == slot);
-        known.map_or(LEAST_HANG, |known| {
-            known.plan.hang_after.unwrap_or((known.timing.deadline * 4).max(LEAST_HANG))
-        })
+        self.seated(executor, slot).map_or(LEAST_HANG, |known| known.timing.hang_after)
     }
 
-    fn index(&self, name: &str) -> Reply<usize> {
-        self.agents.iter().position(|agent| agent.plan.name == name).ok_or_else(|| {
-            Refusal::unknown("agent", name, self.agents.iter().map(|agent| agent.plan.name.as_str()))
+    /// Who sits in a slot.
+    fn seated(&self, executor: usize, slot: u32) -> Option<&Known> {
+        let id = self.executors[executor].slots.get(slot as usize).copied().flatten()?;
+        self.agents.get(&id)
+    }
+
+    fn id_of(&self, name: &str) -> Reply<AgentId> {
+        self.names.get(name).copied().ok_or_else(|| {
+            Refusal::unknown("agent", name, self.in_order().into_iter().map(|agent| agent.plan.name.as_str()))
         })
     }
 
     fn known(&self, name: &str) -> Reply<&Known> {
-        self.index(name).map(|at| &self.agents[at])
+        self.id_of(name).map(|id| &self.agents[&id])
+    }
+
+    /// All agents, in the order in which they were added.
+    fn in_order(&self) -> Vec<&Known> {
+        let mut agents: Vec<&Known> = self.agents.values().collect();
+        agents.sort_unstable_by_key(|known| known.added);
+        agents
     }
 
     fn by_id(&self, id: AgentId) -> Option<&Known> {
-        self.agents.iter().find(|agent| agent.id == id)
+        self.agents.get(&id)
     }
 
-    /// The agent and the place of the port named `agent.port`.
-    fn port(&self, name: &str) -> Reply<(usize, usize)> {
+    /// What is known of an agent that is there.
+    fn of_mut(&mut self, id: AgentId, change: impl FnOnce(&mut Known)) {
+        if let Some(known) = self.agents.get_mut(&id) {
+            change(known);
+        }
+    }
+
+    /// The port named `agent.port`.
+    fn port(&self, name: &str) -> Reply<PortId> {
         let (agent, port) = name.rsplit_once('.').ok_or_else(|| {
             Refusal::new(format!("\"{name}\" is no port")).help("write it as in \"sonar.filtered\"")
         })?;
-        let agent = self.index(agent)?;
-        let ports = &self.agents[agent].kind.ports;
+        let known = self.known(agent)?;
+        let ports = &known.kind.ports;
         let place = ports.iter().position(|known| known.name == port).ok_or_else(|| {
-            Refusal::unknown(
-                &format!("port of {}", self.agents[agent].plan.name),
-                port,
-                ports.iter().map(|known| known.name),
-            )
+            let names = ports.iter().map(|known| known.name);
+            Refusal::unknown(&format!("port of {}", known.plan.name), port, names)
         })?;
-        Ok((agent, place))
+        Ok((known.id, place))
     }
 
     fn executor_for(&self, plan: &AgentPlan, timing: Timing) -> Reply<usize> {
@@ -275,7 +340,7 @@ impl Router {
 
     fn output(&self, port: &str) -> Reply<Arc<dyn OutputEnd>> {
         let (agent, place) = self.port(port)?;
-        let known = &self.agents[agent];
+        let known = &self.agents[&agent];
         let end = known.ends[place].output.clone();
         end.ok_or_else(|| {
             let outputs: Vec<&str> =
@@ -290,9 +355,9 @@ impl Router {
 
     /// The running system as a plan that would start it.
     pub(crate) fn to_plan(&self) -> (Vec<AgentPlan>, Vec<WirePlan>) {
-        let agents =
-            self.agents.iter().map(|known| AgentPlan { params: known.params.clone(), ..known.plan.clone() });
-        let wires = self.wires.iter().filter(|wire| !wire.is_answer).map(|wire| self.plan_of(wire));
+        let agents = self.in_order().into_iter();
+        let agents = agents.map(|known| AgentPlan { params: known.params.clone(), ..known.plan.clone() });
+        let wires = self.wires.values().filter(|wire| !wire.is_answer).map(|wire| self.plan_of(wire));
         (agents.collect(), wires.collect())
     }
 }
@@ -300,11 +365,11 @@ impl Router {
 impl ExecutorKnown {
     /// Whether any agent is on it.
     pub(crate) fn is_used(&self) -> bool {
-        self.slots.iter().any(|taken| *taken)
+        self.slots.iter().any(Option::is_some)
     }
 
     pub(crate) fn new(plan: ExecutorPlan, link: Link) -> ExecutorKnown {
-        ExecutorKnown { plan, link, granted: "simulated".into(), slots: Vec::new() }
+        ExecutorKnown { plan, link, granted: "simulated".into(), slots: Vec::new(), answered: 0 }
     }
 }
 

@@ -224,7 +224,8 @@ impl Player {
                 }
                 loop {
                     let core = &mut self.cores[at];
-                    core.look_at_door(&self.context, self.now);
+                    // Changes are served where they are given.
+                    let _ = core.look_at_door();
                     let Some(job) = core.next(self.now) else { break };
                     let mut moment = Moment::simulated(self.now);
                     // SAFETY: the core lives in this thread's own array, and nobody else takes it.
@@ -272,7 +273,7 @@ impl Player {
         for _ in 0..64 {
             for place in 0..self.order.len() {
                 let core = &mut self.cores[self.order[place]];
-                core.look_at_door(&self.context, self.now);
+                let _ = core.look_at_door();
                 let Some(job) = core.next(self.now) else { continue };
                 if let Some(seat) = core.seats[job.slot as usize].as_ref() {
                     let name = seat.name.as_str().to_owned();

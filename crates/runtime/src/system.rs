@@ -12,7 +12,7 @@ use crate::log::{LogChoice, Recorder};
 use crate::names::Directory;
 use crate::plan::{AgentPlan, Plan, WirePlan};
 use crate::request::{Refusal, Request, SystemView};
-use crate::router::{ExecutorKnown, Fabric, Incident, OutsideCall, Router, ServiceShape};
+use crate::router::{ExecutorKnown, Fabric, Incident, OutsideCall, Router, ServiceShape, Staged};
 use crate::tap::Tap;
 
 /// What somebody wants of a running system, on the way to it.
@@ -202,7 +202,7 @@ pub(crate) struct Built {
     pub directory: Arc<Directory>,
 }
 
-/// Serves changes of cores that nobody runs yet.
+/// Serves changes of cores that nobody runs meanwhile: at once.
 pub(crate) struct Still<'a> {
     pub cores: &'a mut [Core],
     pub context: &'a crate::context::Context,
@@ -210,8 +210,11 @@ pub(crate) struct Still<'a> {
 }
 
 impl Fabric for Still<'_> {
-    fn pump(&mut self, executor: usize) -> bool {
-        self.cores[executor].serve_changes(self.context, self.now);
+    fn ring(&mut self, executor: usize) {
+        self.cores[executor].serve_changes_here(self.context, self.now);
+    }
+
+    fn wait(&mut self) -> bool {
         false
     }
 }
@@ -237,6 +240,7 @@ pub(crate) fn build(plan: &Plan, registry: &Registry, log: LogChoice, now: Time)
     let context = crate::context::Context::new(None, directory.clone());
     let wires = wires_of(plan, registry);
     let mut fabric = Still { cores: &mut cores, context: &context, now };
+    let mut staged = Staged::default();
     for agent in &plan.agents {
         let Some(kind) = registry.get(&agent.kind) else { continue };
         let readers: Vec<usize> = kind
@@ -246,10 +250,11 @@ pub(crate) fn build(plan: &Plan, registry: &Registry, log: LogChoice, now: Time)
                 wires.iter().filter(|wire| wire.from == format!("{}.{}", agent.name, port.name)).count()
             })
             .collect();
-        router.add(agent.clone(), &readers, &mut fabric).map_err(CannotRun::Refused)?;
+        router.add(agent.clone(), &readers, &mut staged).map_err(CannotRun::Refused)?;
     }
     for wire in &wires {
-        router.wire(wire, &mut fabric).map_err(CannotRun::Refused)?;
+        router.wire(wire, &mut staged).map_err(CannotRun::Refused)?;
     }
+    router.settle(staged, &mut fabric);
     Ok(Built { router, cores, directory })
 }

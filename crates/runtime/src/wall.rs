@@ -323,7 +323,7 @@ impl Runner {
         }
         self.note_grants();
         self.make_spares()?;
-        let mut fabric = Threads { cells: &self.cells, waited: None };
+        let mut fabric = Threads::new(&self.cells);
         self.router.supervise(now, &mut fabric);
         self.router.answer_calls(now, &mut fabric);
         for incident in &self.router.incidents[self.incidents_seen..] {
@@ -361,13 +361,13 @@ impl Runner {
     }
 
     fn apply(&mut self, request: Request) -> Result<(), Refusal> {
-        let mut fabric = Threads { cells: &self.cells, waited: None };
+        let mut fabric = Threads::new(&self.cells);
         self.router.apply(request, self.clock.now(), &mut fabric)
     }
 
     fn call(&mut self, call: OutsideCall, now: Time) {
         let said = call.said();
-        let mut fabric = Threads { cells: &self.cells, waited: None };
+        let mut fabric = Threads::new(&self.cells);
         let refused = self.router.call(call, now, &mut fabric).err();
         let outcome = refused.map_or(String::new(), |refusal| format!("; refused: {refusal}"));
         self.router.log_shared.note(now, "control", &format!("asked: {said}{outcome}"));
@@ -399,7 +399,7 @@ impl Runner {
 
     /// Stops the agents, then the threads. A thread in a step that does not return is left behind.
     fn end(&mut self) {
-        let mut fabric = Threads { cells: &self.cells, waited: None };
+        let mut fabric = Threads::new(&self.cells);
         self.router.stop_all(&mut fabric);
         for cell in &self.cells {
             cell.stop.store(true, Ordering::Release);
@@ -424,28 +424,26 @@ impl Runner {
 /// Serves changes by waking the executor's thread and waiting for it.
 struct Threads<'a> {
     cells: &'a [Arc<Cell>],
-    waited: Option<i64>,
+    /// Since when it is waited.
+    since: Option<i64>,
+}
+
+impl Threads<'_> {
+    fn new(cells: &[Arc<Cell>]) -> Threads<'_> {
+        Threads { cells, since: None }
+    }
 }
 
 impl Fabric for Threads<'_> {
-    fn pump(&mut self, executor: usize) -> bool {
-        let now = os::monotonic();
-        match self.waited {
-            None => {
-                self.cells[executor].door.ring(CHANGES);
-                self.waited = Some(now);
-            }
-            Some(_) => std::thread::park_timeout(HostDuration::from_micros(20)),
-        }
-        let go_on = now - self.waited.unwrap_or(now) < PATIENCE.0;
-        if !go_on {
-            self.waited = None;
-        }
-        go_on
+    fn ring(&mut self, executor: usize) {
+        self.cells[executor].door.ring(CHANGES);
     }
 
-    fn answered(&mut self) {
-        self.waited = None;
+    fn wait(&mut self) -> bool {
+        let now = os::monotonic();
+        let since = *self.since.get_or_insert(now);
+        std::thread::park_timeout(HostDuration::from_micros(20));
+        now - since < PATIENCE.0
     }
 }
 
@@ -531,14 +529,17 @@ fn run_core(
     };
     let mut at = watch.fresh(Time::ZERO);
     loop {
-        let job = {
-            // SAFETY: the core is this thread's own, and the borrow ends before the step.
-            let core = unsafe { &mut *core };
-            if core.look_at_door(context, at.time) || watch.is_old(&at) {
-                at = watch.fresh(at.time);
-            }
-            core.next(at.time)
-        };
+        // SAFETY: the core is this thread's own, and the borrow ends here.
+        let changes = unsafe { (*core).look_at_door() };
+        // SAFETY: the core is this thread's own; the last says whether it still is when somebody was stopped.
+        if changes && !unsafe { Core::serve_changes(core, context, at.time, &|| cell.owner.keeps(number)) } {
+            return;
+        }
+        if changes || watch.is_old(&at) {
+            at = watch.fresh(at.time);
+        }
+        // SAFETY: as above, and the borrow ends before the step.
+        let job = unsafe { (*core).next(at.time) };
         if let Some(job) = job {
             let mine = || cell.owner.keeps(number);
             // SAFETY: the core is this thread's own; `mine` says whether it still is after the step.

@@ -1,5 +1,7 @@
 //! Changes of an executor: prepared on the control side, committed between two steps, and given back to be freed.
 
+#![allow(unsafe_code)]
+
 use std::any::Any;
 use std::cmp::Reverse;
 use std::collections::BinaryHeap;
@@ -14,12 +16,16 @@ use crate::allocations;
 use crate::context::Context;
 use crate::door::Door;
 use crate::handover::Running;
+use crate::os;
 use crate::port::{Envelope, InputEnd, OutputEnd, WireId};
 use crate::ring;
 use crate::stats::{bump, bump_by};
-use crate::turn::Turn;
+use crate::sync::{Ordering, light_barrier};
 
 /// A change, prepared on the control side. It comes back as an answer, with what is to be freed in it.
+///
+/// Whatever touches an end of an agent, or the agent itself, says in which slot it sits: while the agent is lost in a step that does
+/// not return, the thread that lost it may be using its ends, and nobody else may.
 pub(crate) enum Change {
     Seat {
         slot: u32,
@@ -48,15 +54,18 @@ pub(crate) enum Change {
         wire: WireId,
         into: Box<dyn Any + Send>,
         force: bool,
+        slot: u32,
     },
     Route {
         end: Arc<dyn OutputEnd>,
         route: Box<dyn Any + Send>,
+        slot: u32,
     },
     Forget {
         end: Arc<dyn OutputEnd>,
         wire: WireId,
         into: Box<dyn Any + Send>,
+        slot: u32,
     },
     Body {
         slot: u32,
@@ -80,12 +89,14 @@ pub(crate) enum Change {
     OutputFault {
         end: Arc<dyn OutputEnd>,
         faulty: Box<dyn Any + Send>,
+        slot: u32,
     },
     /// Sends a message that comes from outside, on the thread that owns the routes.
     Send {
         end: Arc<dyn OutputEnd>,
         message: Box<dyn Any + Send>,
         envelope: Envelope,
+        slot: u32,
     },
     /// Changes nothing: who asks knows that the executor answers.
     Nothing,
@@ -98,13 +109,38 @@ pub(crate) fn heaps_for(agents: usize) -> (Releases, Due) {
     (BinaryHeap::with_capacity(agents * 3 + SPARE_ALARMS), BinaryHeap::with_capacity(agents + SPARE_ALARMS))
 }
 
+impl Change {
+    /// The slot of the agent whose ends or body it touches.
+    fn touches(&self) -> Option<u32> {
+        match self {
+            Change::Join { slot, .. }
+            | Change::Leave { slot, .. }
+            | Change::Route { slot, .. }
+            | Change::Forget { slot, .. }
+            | Change::Body { slot, .. }
+            | Change::Params { slot, .. }
+            | Change::Timing { slot, .. }
+            | Change::Fault { slot, .. }
+            | Change::OutputFault { slot, .. }
+            | Change::Send { slot, .. } => Some(*slot),
+            // A seat is exchanged or taken away whole, and what is lost has left it.
+            Change::Seat { .. }
+            | Change::Unseat { .. }
+            | Change::Order { .. }
+            | Change::Nothing
+            | Change::Stop => None,
+        }
+    }
+}
+
 /// What an executor tells the control side.
 pub(crate) enum Answer {
-    /// With the number of the change.
+    /// With the number of the change, as of the others.
     Done(u64, Change),
+    /// The wire has messages still.
     NotDrained(u64, Change),
-    /// It had been taken back before the executor came upon it.
-    TakenBack(Change),
+    /// It was not done, because the agent is lost, or died of it; or somebody was lost in it, and then it did not come back.
+    Lost(u64, Option<Change>),
     Died {
         slot: u32,
         id: AgentId,
@@ -114,11 +150,17 @@ pub(crate) enum Answer {
     },
 }
 
+/// What became of a change.
+enum Outcome {
+    Done,
+    NotDrained,
+    Lost,
+}
+
 /// The control side's ends of an executor.
 pub(crate) struct Link {
     pub(super) changes: ring::Sender<Option<(u64, Change)>>,
     pub(super) answers: ring::Receiver<Option<Answer>>,
-    pub(super) turn: Arc<Turn>,
     /// The number of the last change that was given.
     pub(super) given: u64,
     pub door: Arc<Door>,
@@ -126,25 +168,17 @@ pub(crate) struct Link {
 }
 
 impl Link {
-    /// Gives a change to the executor, unless too many are under way.
-    pub(crate) fn change(&mut self, change: Change) -> bool {
-        let has_room = self.changes.has_room();
-        if has_room {
-            self.given += 1;
-            let number = self.given;
-            self.changes.push(|slot| *slot = Some((number, change)));
-        }
-        has_room
+    /// Whether there is room for a change: too many may be under way.
+    pub(crate) fn has_room(&mut self) -> bool {
+        self.changes.has_room()
     }
 
-    /// The number of the change that was given last.
-    pub(crate) fn last_given(&self) -> u64 {
-        self.given
-    }
-
-    /// Takes the last change back. False when the executor has begun it: then its answer is on the way.
-    pub(crate) fn take_back(&mut self) -> bool {
-        self.turn.decide(self.given)
+    /// Gives a change to the executor, which serves them in this order. Gives its number. There must be room.
+    pub(crate) fn change(&mut self, change: Change) -> u64 {
+        self.given += 1;
+        let number = self.given;
+        self.changes.push(|slot| *slot = Some((number, change)));
+        number
     }
 
     /// The next answer.
@@ -165,22 +199,56 @@ impl Core {
         }
     }
 
-    /// Commits the changes that wait. Each goes back to the control side, to be freed there.
-    pub(crate) fn serve_changes(&mut self, context: &Context, now: Time) {
-        while self.answers.has_room() && self.changes.advance() {
-            let Some((number, mut change)) = self.changes.current_mut().take() else { return };
-            if !self.turn.decide(number) {
-                self.answer(Answer::TakenBack(change));
-                continue;
-            }
+    /// Commits the changes that wait. Each goes back to the control side, to be freed there. False when the core was lost meanwhile
+    /// to another thread, because somebody did not return from its stop.
+    ///
+    /// # Safety
+    /// As for [`Core::run`].
+    pub(crate) unsafe fn serve_changes(
+        core: *mut Core,
+        context: &Context,
+        now: Time,
+        still_mine: &dyn Fn() -> bool,
+    ) -> bool {
+        loop {
+            // SAFETY: the caller owns the core; this borrow ends here.
+            let Some((number, mut change)) = (unsafe { &mut *core }).next_change() else { return true };
             let before = allocations::so_far();
-            let done = self.commit(&mut change, context, now);
-            // An agent that is stopped may free what it likes.
-            if !matches!(change, Change::Stop | Change::Unseat { .. } | Change::Body { .. }) {
-                self.note_allocations(allocations::so_far() - before);
-            }
-            self.answer(if done { Answer::Done(number, change) } else { Answer::NotDrained(number, change) });
+            // SAFETY: as the caller promises.
+            let Some((outcome, foreign)) = (unsafe { commit(core, &mut change, context, now, still_mine) })
+            else {
+                // What is left of the change is freed here, on a thread that has lost its priority.
+                return false;
+            };
+            // SAFETY: the core is still this thread's.
+            let core = unsafe { &mut *core };
+            core.changing = None;
+            core.note_allocations(allocations::so_far() - before - foreign);
+            core.answer(match outcome {
+                Outcome::Done => Answer::Done(number, change),
+                Outcome::NotDrained => Answer::NotDrained(number, change),
+                Outcome::Lost => Answer::Lost(number, Some(change)),
+            });
         }
+    }
+
+    /// The same where nobody can take the core over.
+    pub(crate) fn serve_changes_here(&mut self, context: &Context, now: Time) {
+        // SAFETY: the core is borrowed here, and nobody else takes it.
+        unsafe { Core::serve_changes(self, context, now, &|| true) };
+    }
+
+    fn next_change(&mut self) -> Option<(u64, Change)> {
+        if !self.answers.has_room() || !self.changes.advance() {
+            return None;
+        }
+        let next = self.changes.current_mut().take();
+        self.changing = next.as_ref().map(|(number, _)| *number);
+        next
+    }
+
+    fn is_lost(&self, slot: u32) -> bool {
+        self.seats.get(slot as usize).and_then(Option::as_ref).is_some_and(|seat| seat.lost)
     }
 
     #[inline]
@@ -190,7 +258,7 @@ impl Core {
         }
     }
 
-    /// Says whether it is done; a wire that still has messages is not cut yet.
+    /// Does what needs nobody else's code. False for a wire that still has messages: it is not cut yet.
     fn commit(&mut self, change: &mut Change, context: &Context, now: Time) -> bool {
         match change {
             Change::Seat { slot, seat, seats, room } => {
@@ -202,19 +270,13 @@ impl Core {
                     self.seats.resize_with(*slot as usize + 1, || None);
                 }
                 if let Some(mut new) = seat.take() {
+                    self.due.retain(|Reverse((_, _, known, _))| *known != *slot);
                     if new.timing.period > Duration::ZERO {
                         new.next_release = now;
                         self.push_release(now, *slot);
                     }
                     *seat = self.seats[*slot as usize].replace(new);
                 }
-            }
-            Change::Unseat { slot, seat } => {
-                *seat = self.seats.get_mut(*slot as usize).and_then(Option::take);
-                if let Some(seat) = seat {
-                    self.stop_agent(seat, context, now);
-                }
-                self.due.retain(|Reverse((_, _, known, _))| *known != *slot);
             }
             Change::Order { order, ranks, words, releases, due } => {
                 self.reorder(order, ranks, words);
@@ -228,123 +290,61 @@ impl Core {
                     core::mem::swap(due, &mut self.due);
                 }
             }
-            Change::Join { end, lanes, slot } => {
-                end.join(lanes.as_mut());
-                let _ = slot;
-            }
-            Change::Leave { end, wire, into, force } => {
+            Change::Join { end, lanes, .. } => end.join(lanes.as_mut()),
+            Change::Leave { end, wire, into, force, .. } => {
                 if !*force && !end.is_drained(*wire) {
                     return false;
                 }
                 end.leave(*wire, into.as_mut());
             }
-            Change::Route { end, route } => end.add_route(route.as_mut()),
-            Change::Forget { end, wire, into } => end.forget(*wire, into.as_mut()),
-            Change::Body { slot, body, hands_over } => self.put_body(*slot, body, *hands_over, context, now),
+            Change::Route { end, route, .. } => end.add_route(route.as_mut()),
+            Change::Forget { end, wire, into, .. } => end.forget(*wire, into.as_mut()),
             Change::Params { slot, params } => {
                 let seat = self.seats.get_mut(*slot as usize).and_then(Option::as_mut);
                 if let Some(body) = seat.and_then(|seat| seat.body.as_mut()) {
                     body.swap_params(params.as_mut());
                 }
             }
-            Change::Timing { slot, timing } => {
-                if let Some(seat) = self.seats.get_mut(*slot as usize).and_then(Option::as_mut) {
-                    // A longer period holds at once, a shorter one from the next release on.
-                    let next = if timing.period <= Duration::ZERO {
-                        Time::NEVER
-                    } else if seat.next_release == Time::NEVER {
-                        now
-                    } else if timing.period > seat.timing.period {
-                        seat.next_release - seat.timing.period + timing.period
-                    } else {
-                        seat.next_release
-                    };
-                    seat.timing = *timing;
-                    seat.next_release = next;
-                    if seat.put_off < Time::NEVER {
-                        // Whether it still has to wait is seen when it is looked at next.
-                        seat.put_off = Time::NEVER;
-                        self.ready.mark(*slot);
-                    }
-                    if next < Time::NEVER {
-                        self.push_release(next, *slot);
-                    }
-                }
-            }
+            Change::Timing { slot, timing } => self.set_timing(*slot, *timing, now),
             Change::Fault { slot, fault } => {
                 if let Some(seat) = self.seats.get_mut(*slot as usize).and_then(Option::as_mut) {
                     seat.fault = *fault;
                 }
             }
-            Change::Nothing => {}
-            Change::OutputFault { end, faulty } => end.set_fault(faulty.as_mut()),
-            Change::Send { end, message, envelope } => {
+            Change::OutputFault { end, faulty, .. } => end.set_fault(faulty.as_mut()),
+            Change::Send { end, message, envelope, .. } => {
                 context.begin(AgentId::NONE, now, self.number);
                 end.send_prepared(envelope, message.as_ref());
                 context.end();
                 self.mark_woken(context);
             }
-            Change::Stop => {
-                let mut seats = core::mem::take(&mut self.seats);
-                for seat in seats.iter_mut().flatten() {
-                    self.stop_agent(seat, context, now);
-                }
-                self.seats = seats;
-            }
+            // With agents that have a word in it: not here.
+            Change::Nothing | Change::Unseat { .. } | Change::Body { .. } | Change::Stop => {}
         }
         true
     }
 
-    /// Puts another instance in the place of the present one, which is stopped if it is alive.
-    fn put_body(
-        &mut self,
-        slot: u32,
-        body: &mut Option<Box<dyn Body>>,
-        hands_over: bool,
-        context: &Context,
-        now: Time,
-    ) {
-        let Some(mut seat) = self.seats.get_mut(slot as usize).and_then(Option::take) else { return };
-        if let (Some(new), Some(old)) = (body.as_mut(), seat.body.as_mut())
-            && hands_over
-        {
-            context.begin(seat.id, now, self.number);
-            let handed = catch_unwind(AssertUnwindSafe(|| new.take_over(&mut **old)));
-            context.end();
-            self.mark_woken(context);
-            if let Err(payload) = handed {
-                // The new one dies of it. The old one goes with it: what it knew may be half moved.
-                bump(&seat.stats.panics);
-                let cause = RawCause::Panic(context.panic_record(), payload);
-                self.answer(Answer::Died { slot, id: seat.id, time: now, cause, body: body.take() });
-            }
-        }
-        self.stop_agent(&mut seat, context, now);
-        core::mem::swap(&mut seat.body, body);
-        seat.started = false;
-        // What the one before took is not its own doing.
-        let mut has_message = false;
-        for input in &seat.on {
-            has_message |= input.settle().left;
-        }
-        self.seats[slot as usize] = Some(seat);
-        if has_message {
+    fn set_timing(&mut self, slot: u32, timing: Timing, now: Time) {
+        let Some(seat) = self.seats.get_mut(slot as usize).and_then(Option::as_mut) else { return };
+        // A longer period holds at once, a shorter one from the next release on.
+        let next = if timing.period <= Duration::ZERO {
+            Time::NEVER
+        } else if seat.next_release == Time::NEVER {
+            now
+        } else if timing.period > seat.timing.period {
+            seat.next_release - seat.timing.period + timing.period
+        } else {
+            seat.next_release
+        };
+        seat.timing = timing;
+        seat.next_release = next;
+        if seat.put_off < Time::NEVER {
+            // Whether it still has to wait is seen when it is looked at next.
+            seat.put_off = Time::NEVER;
             self.ready.mark(slot);
         }
-    }
-
-    fn stop_agent(&mut self, seat: &mut Seat, context: &Context, now: Time) {
-        let Some(body) = seat.body.as_mut() else { return };
-        if !seat.started {
-            return;
-        }
-        context.begin(seat.id, now, self.number);
-        let mut step = Step { now, deadline: now, agent: seat.id, period: seat.timing.period };
-        let stopped = catch_unwind(AssertUnwindSafe(|| body.stop(&mut step)));
-        context.end();
-        self.mark_woken(context);
-        if stopped.is_err() {
-            bump(&seat.stats.panics);
+        if next < Time::NEVER {
+            self.push_release(next, slot);
         }
     }
 
@@ -358,5 +358,194 @@ impl Core {
         core::mem::swap(&mut self.order, order);
         self.ready.set_order(ranks, words);
         self.cursor = 0;
+    }
+}
+
+/// What happened, and how often agents took or freed memory in it; nothing when the core was lost.
+type Committed = Option<(Outcome, u64)>;
+
+/// Commits one change. While an agent's own code runs in it, nobody holds a reference into the core and the watchdog looks on, as in
+/// a step.
+///
+/// # Safety
+/// As for [`Core::run`].
+unsafe fn commit(
+    core: *mut Core,
+    change: &mut Change,
+    context: &Context,
+    now: Time,
+    still_mine: &dyn Fn() -> bool,
+) -> Committed {
+    let mut foreign = 0;
+    let visit = Visit { core, context, now, still_mine };
+    // SAFETY: the caller owns the core; this borrow ends here.
+    if change.touches().is_some_and(|slot| unsafe { &*core }.is_lost(slot)) {
+        return Some((Outcome::Lost, 0));
+    }
+    match change {
+        Change::Unseat { slot, seat } => {
+            // SAFETY: as above, and each borrow ends in its line.
+            unsafe { visit.stop(*slot, &mut foreign) }?;
+            // SAFETY: as above.
+            let core = unsafe { &mut *core };
+            *seat = core.seats.get_mut(*slot as usize).and_then(Option::take);
+            core.due.retain(|Reverse((_, _, known, _))| *known != *slot);
+        }
+        Change::Body { slot, body, hands_over } => {
+            // SAFETY: as above.
+            let lives = unsafe { visit.put_body(*slot, body, *hands_over, &mut foreign) }?;
+            return Some((if lives { Outcome::Done } else { Outcome::Lost }, foreign));
+        }
+        Change::Stop => {
+            // SAFETY: as above.
+            for slot in 0..unsafe { &*core }.seats.len() as u32 {
+                // SAFETY: as above.
+                unsafe { visit.stop(slot, &mut foreign) }?;
+            }
+        }
+        plain => {
+            // SAFETY: as above.
+            let done = unsafe { &mut *core }.commit(plain, context, now);
+            return Some((if done { Outcome::Done } else { Outcome::NotDrained }, 0));
+        }
+    }
+    Some((Outcome::Done, foreign))
+}
+
+/// An agent's own code between two steps.
+struct Visit<'a> {
+    core: *mut Core,
+    context: &'a Context,
+    now: Time,
+    still_mine: &'a dyn Fn() -> bool,
+}
+
+impl Visit<'_> {
+    /// Calls into the agent in a slot. Nothing when it did not return in time: then the core is another thread's.
+    ///
+    /// # Safety
+    /// The core is this thread's, and what `work` uses is not in it.
+    unsafe fn call(
+        &self,
+        slot: u32,
+        foreign: &mut u64,
+        work: &mut dyn FnMut(&mut Step),
+    ) -> Option<std::thread::Result<()>> {
+        let (mut step, running) = {
+            // SAFETY: as the caller promises; this borrow ends before the agent's code.
+            let core = unsafe { &mut *self.core };
+            let Some(seat) = core.seats.get(slot as usize).and_then(Option::as_ref) else {
+                return Some(Ok(()));
+            };
+            self.context.begin(seat.id, self.now, core.number);
+            core.running.limit.store(seat.timing.hang_after.0 as u64, Ordering::Relaxed);
+            core.running.since.store(os::ticks(), Ordering::Relaxed);
+            core.running.agent.store(seat.id.0, Ordering::Relaxed);
+            core.running.begin(slot);
+            let step = Step { now: self.now, deadline: self.now, agent: seat.id, period: seat.timing.period };
+            (step, Arc::as_ptr(&core.running))
+        };
+        let before = allocations::so_far();
+        let result = catch_unwind(AssertUnwindSafe(|| work(&mut step)));
+        *foreign += allocations::so_far() - before;
+        // SAFETY: the figures outlive the core, whoever has it.
+        unsafe { &*running }.end();
+        // As at the end of a step.
+        light_barrier();
+        if !(self.still_mine)() {
+            return None;
+        }
+        self.context.end();
+        // SAFETY: the core is still this thread's.
+        unsafe { &mut *self.core }.mark_woken(self.context);
+        Some(result)
+    }
+
+    /// Stops the agent in a slot, if it has begun.
+    ///
+    /// # Safety
+    /// As for [`Core::run`].
+    unsafe fn stop(&self, slot: u32, foreign: &mut u64) -> Option<()> {
+        let mut body = {
+            // SAFETY: this borrow ends before the agent's code.
+            let core = unsafe { &mut *self.core };
+            let Some(seat) = core.seats.get_mut(slot as usize).and_then(Option::as_mut) else {
+                return Some(());
+            };
+            if !core::mem::take(&mut seat.started) {
+                return Some(());
+            }
+            let Some(body) = seat.body.take() else { return Some(()) };
+            body
+        };
+        // SAFETY: the body is out of the core.
+        let stopped = unsafe { self.call(slot, foreign, &mut |step| body.stop(step)) }?;
+        // SAFETY: the core is still this thread's.
+        let core = unsafe { &mut *self.core };
+        if let Some(seat) = core.seats.get_mut(slot as usize).and_then(Option::as_mut) {
+            if stopped.is_err() {
+                bump(&seat.stats.panics);
+            }
+            seat.body = Some(body);
+        }
+        Some(())
+    }
+
+    /// Puts another instance in the place of the present one, which is stopped if it is alive. Says whether the new one lives: it can die
+    /// of taking over.
+    ///
+    /// # Safety
+    /// As for [`Core::run`].
+    unsafe fn put_body(
+        &self,
+        slot: u32,
+        body: &mut Option<Box<dyn Body>>,
+        hands_over: bool,
+        foreign: &mut u64,
+    ) -> Option<bool> {
+        let old = {
+            // SAFETY: this borrow ends before the agent's code.
+            let core = unsafe { &mut *self.core };
+            let Some(seat) = core.seats.get_mut(slot as usize).and_then(Option::as_mut) else {
+                return Some(true);
+            };
+            if hands_over { seat.body.take() } else { None }
+        };
+        let mut lives = true;
+        if let (Some(mut old), Some(new)) = (old, body.as_mut()) {
+            // SAFETY: both bodies are out of the core.
+            let handed = unsafe { self.call(slot, foreign, &mut |_| new.take_over(&mut *old)) }?;
+            // SAFETY: the core is still this thread's.
+            let core = unsafe { &mut *self.core };
+            if let Some(seat) = core.seats.get_mut(slot as usize).and_then(Option::as_mut) {
+                seat.body = Some(old);
+                if let Err(payload) = handed {
+                    // The new one dies of it. The old one goes with it: what it knew may be half moved.
+                    lives = false;
+                    bump(&seat.stats.panics);
+                    let cause = RawCause::Panic(self.context.panic_record(), payload);
+                    let id = seat.id;
+                    core.answer(Answer::Died { slot, id, time: self.now, cause, body: body.take() });
+                }
+            }
+        }
+        // SAFETY: as for this function.
+        unsafe { self.stop(slot, foreign) }?;
+        // SAFETY: the core is still this thread's.
+        let core = unsafe { &mut *self.core };
+        let Some(seat) = core.seats.get_mut(slot as usize).and_then(Option::as_mut) else {
+            return Some(true);
+        };
+        core::mem::swap(&mut seat.body, body);
+        seat.started = false;
+        // What the one before took is not its own doing.
+        let mut has_message = false;
+        for input in &seat.on {
+            has_message |= input.settle().left;
+        }
+        if has_message {
+            core.ready.mark(slot);
+        }
+        Some(lives)
     }
 }

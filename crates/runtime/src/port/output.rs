@@ -136,8 +136,9 @@ impl<T: Message> OutputEnd for OutputCore<T> {
         Ok(PreparedWire { route, lanes })
     }
 
-    fn set_sender(&self, sender: AgentId) {
-        self.inner().sender = sender;
+    fn set_sender(&self, sender: AgentId, sequence: u64) {
+        (self.inner().sender, self.inner().sequence) = (sender, sequence);
+        self.sent.store(sequence, Ordering::Relaxed);
     }
 
     fn add_route(&self, route: &mut (dyn Any + Send)) {

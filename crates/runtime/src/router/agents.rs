@@ -1,28 +1,24 @@
 //! Agents: adding and removing them, and what can be asked of one.
 
-use core::sync::atomic::Ordering::Relaxed;
+use std::collections::BTreeSet;
 use std::sync::Arc;
 
 use types::value::Table;
 use types::{AgentId, Duration, Name, Time};
 
-use super::{Fabric, Known, Reply, Router, SPARE_SEATS, Wire, first, robot_wires, timing_of};
+use super::script::{Step, What};
+use super::{Known, Reply, Rings, Router, SPARE_SEATS, Staged, Wire, first, robot_wires, timing_of};
 use crate::agent::{AgentType, Body};
-use crate::executor::{Change, Seat};
+use crate::executor::{Change, Seat, StepFault};
 use crate::plan::{AgentPlan, WirePlan};
-use crate::port::{Direction, Envelope, OutputEnd, OutputFault, PortEnds, WireId};
+use crate::port::{Envelope, OutputFault, PortEnds, WireId};
 use crate::request::{AgentState, FaultKind, Refusal};
 use crate::stats::AgentStats;
 
 impl Router {
     /// Adds an agent. `readers` is how many wires the plan leads from each of its ports.
-    pub(crate) fn add(
-        &mut self,
-        plan: AgentPlan,
-        readers: &[usize],
-        fabric: &mut dyn Fabric,
-    ) -> Reply<AgentId> {
-        if self.agents.iter().any(|agent| agent.plan.name == plan.name) {
+    pub(crate) fn add(&mut self, plan: AgentPlan, readers: &[usize], staged: &mut Staged) -> Reply<AgentId> {
+        if self.names.contains_key(&plan.name) {
             return Err(Refusal::new(format!("there is already an agent \"{}\"", plan.name))
                 .help("names are given once"));
         }
@@ -37,85 +33,83 @@ impl Router {
         let mut body = kind.build(&plan.params).map_err(first)?;
         let timing = timing_of(&plan)?;
         let executor = self.executor_for(&plan, timing)?;
-        let id = AgentId(self.next_agent);
-
-        let mut ends = Vec::new();
-        body.visit_ports(&mut |visit| {
-            let seats = readers.get(ends.len()).copied().unwrap_or(0) + SPARE_SEATS;
-            let made = visit.port.create(&visit.options, seats);
-            visit.port.bind(&made);
-            if let Some(output) = &made.output {
-                output.set_sender(id);
-            }
-            ends.push(made);
-        });
-        let mut on = Vec::new();
-        for input in &plan.on {
-            let place = kind
-                .ports
-                .iter()
-                .position(|port| port.name == input)
-                .filter(|place| ends[*place].input.is_some());
-            let Some(place) = place else {
-                let known = kind.ports.iter().filter(|port| port.shape.input.is_some()).map(|port| port.name);
-                return Err(Refusal::unknown(&format!("input of {}", plan.name), input, known));
-            };
-            on.extend(ends[place].input.clone());
+        let ends = new_ends(&plan, &kind, body.as_mut(), readers)?;
+        let Some(id) = self.directory.give(&plan.name) else {
+            return Err(Refusal::new("there are as many agents as there can be"));
+        };
+        for output in ends.iter().filter_map(|end| end.output.as_ref()) {
+            output.set_sender(id, 0);
         }
-        // Answers make a client run, wherever they come from.
-        let clients =
-            kind.ports.iter().zip(&ends).filter(|(port, _)| port.shape.direction == Direction::Client);
-        on.extend(clients.filter_map(|(_, end)| end.input.clone()));
         self.number_outputs(&plan.name, &kind, &ends);
 
-        self.next_agent += 1;
         let slots = &mut self.executors[executor].slots;
-        let slot = slots.iter().position(|taken| !taken).unwrap_or(slots.len());
+        let slot = slots.iter().position(Option::is_none).unwrap_or(slots.len());
         if slot == slots.len() {
-            slots.push(true);
+            slots.push(Some(id));
         } else {
-            slots[slot] = true;
+            slots[slot] = Some(id);
         }
-        let room = slots.len();
         let slot = slot as u32;
-        let stats = Arc::new(AgentStats::default());
-        let seat = Seat {
+        let spare = kind.build(&plan.params).ok();
+        self.added += 1;
+        let ports = kind.ports.len();
+        let known = Known {
             id,
-            name: Name::new(&plan.name),
-            body: Some(body),
-            on,
+            added: self.added,
+            kind,
+            params,
+            executor,
+            slot,
+            rings: vec![Rings::default(); ports],
+            wires: BTreeSet::new(),
+            ends,
+            stats: Arc::new(AgentStats::default()),
             timing,
-            stats: stats.clone(),
+            fault: StepFault::None,
+            output_faults: vec![OutputFault::None; ports],
+            state: AgentState::Running,
+            restart_at: Time::NEVER,
+            starting: false,
+            deaths: Vec::new(),
+            last_death: None,
+            spare,
+            plan,
+        };
+        staged.step(self.seat_step(&known, Some(body)));
+        staged.reorder(executor);
+        staged.undo(move |router| {
+            if let Some(known) = router.agents.remove(&id) {
+                router.names.remove(&known.plan.name);
+            }
+            router.executors[executor].slots[slot as usize] = None;
+            router.directory.take_back(id);
+        });
+        self.names.insert(known.plan.name.clone(), id);
+        self.agents.insert(id, known);
+        Ok(id)
+    }
+
+    /// Puts an agent on its seat, with a body or without.
+    pub(super) fn seat_step(&self, known: &Known, body: Option<Box<dyn Body>>) -> Step {
+        let room = self.executors[known.executor].slots.len();
+        let seat = Seat {
+            id: known.id,
+            name: Name::new(&known.plan.name),
+            body,
+            on: known.on(),
+            timing: known.timing,
+            stats: known.stats.clone(),
             next_release: Time::NEVER,
             alarm: Time::NEVER,
             put_off: Time::NEVER,
             last_step: Time(i64::MIN / 2),
             started: false,
-            fault: Default::default(),
+            fault: known.fault,
+            lost: false,
         };
-        let spare = kind.build(&plan.params).ok();
-        self.agents.push(Known {
-            id,
-            kind,
-            params,
-            executor,
-            slot,
-            ends,
-            stats,
-            timing,
-            state: AgentState::Running,
-            restart_at: Time::NEVER,
-            deaths: Vec::new(),
-            last_death: None,
-            spare,
-            plan,
-        });
-        self.directory.remember(id, &self.agents[self.agents.len() - 1].plan.name);
-        // The order first: a seat that is due must have its place.
-        self.commit_order(executor, fabric)?;
         let seats = Vec::with_capacity((room * 2).max(8));
-        self.commit(executor, Change::Seat { slot, seat: Some(Box::new(seat)), seats, room }, fabric)?;
-        Ok(id)
+        let change = Change::Seat { slot: known.slot, seat: Some(Box::new(seat)), seats, room };
+        Step { executor: known.executor, of: known.id, ring: None, what: What::Change(change) }
     }
 
     /// Gives each output its number in the log, the same as before where an agent of that name was there before.
@@ -147,44 +141,55 @@ impl Router {
         robot_wires(plan, kind, robot)
     }
 
-    pub(super) fn remove(&mut self, name: &str, fabric: &mut dyn Fabric) -> Reply<()> {
-        let at = self.index(name)?;
+    /// Adds an agent and wires it to its robot.
+    pub(super) fn add_wired(&mut self, plan: AgentPlan, staged: &mut Staged) -> Reply<()> {
+        let wires = self.robot_wires(&plan);
+        self.add(plan, &[], staged)?;
+        wires.iter().try_for_each(|wire| self.wire(wire, staged))
+    }
+
+    pub(super) fn remove(&mut self, name: &str, staged: &mut Staged) -> Reply<()> {
+        let id = self.id_of(name)?;
         if self.robots.iter().any(|robot| robot == name) {
             return Err(Refusal::new(format!(
                 "\"{name}\" is a robot, and the gate in front of it cannot be removed"
             )));
         }
-        let (id, executor, slot) = (self.agents[at].id, self.agents[at].executor, self.agents[at].slot);
         let is_for_it = |wire: &&Wire| wire.filter.recipient.as_deref() == Some(name);
-        if let Some(wire) =
-            self.wires.iter().filter(is_for_it).find(|wire| wire.from.0 != id && wire.to.0 != id)
-        {
+        let others = |wire: &&Wire| wire.from.0 != id && wire.to.0 != id;
+        if let Some(wire) = self.wires.values().filter(is_for_it).find(others) {
             // Whoever gets the name later has another number, and the filter would let nothing for it through.
             let WirePlan { from, to, .. } = self.plan_of(wire);
             return Err(Refusal::new(format!("the wire from {from} to {to} takes what is for {name}"))
                 .help("cut that wire first"));
         }
-        let wires: Vec<WireId> = self
-            .wires
-            .iter()
-            .filter(|wire| wire.from.0 == id || wire.to.0 == id)
-            .map(|wire| wire.id)
-            .collect();
-        self.end_calls_of(id);
-        // First nobody sends to it any more, then it stops, then it is gone from the wires to others.
-        for wire in &wires {
-            self.cut(*wire, true, fabric)?;
+        // First nobody sends to it any more, and it is gone from the wires to others, who take what is on them yet; then it stops.
+        for wire in self.agents[&id].wires.iter().copied().collect::<Vec<WireId>>() {
+            let receives = self.wires.get(&wire).is_some_and(|wire| wire.to.0 == id);
+            self.cut(wire, !receives, staged);
         }
-        self.commit(executor, Change::Unseat { slot, seat: None }, fabric)?;
-        self.agents.retain(|agent| agent.id != id);
-        self.executors[executor].slots[slot as usize] = false;
-        self.commit_order(executor, fabric)
+        let Some(known) = self.agents.remove(&id) else { return Ok(()) };
+        self.names.remove(name);
+        let (executor, slot) = (known.executor, known.slot);
+        let unseat = Change::Unseat { slot, seat: None };
+        staged.step(Step { executor, of: id, ring: None, what: What::Change(unseat) });
+        staged.reorder(executor);
+        staged.when_decided(move |router| {
+            router.end_calls_of(id, "was removed before it answered");
+            router.directory.take_back(id);
+        });
+        staged.undo(move |router| {
+            router.names.insert(known.plan.name.clone(), id);
+            router.agents.insert(id, known);
+        });
+        Ok(())
     }
 
-    pub(super) fn restart_now(&mut self, name: &str, fabric: &mut dyn Fabric) -> Reply<()> {
-        let at = self.index(name)?;
-        let body = self.agents[at].kind.build(&self.agents[at].params).map_err(first)?;
-        self.install(at, body, false, fabric)
+    pub(super) fn restart_now(&mut self, name: &str, staged: &mut Staged) -> Reply<()> {
+        let id = self.id_of(name)?;
+        let body = self.agents[&id].kind.build(&self.agents[&id].params).map_err(first)?;
+        staged.step(self.install(id, body, false));
+        Ok(())
     }
 
     pub(super) fn replace(
@@ -192,9 +197,9 @@ impl Router {
         name: &str,
         kind: &str,
         params: &Table,
-        fabric: &mut dyn Fabric,
+        staged: &mut Staged,
     ) -> Reply<()> {
-        let at = self.index(name)?;
+        let id = self.id_of(name)?;
         let new = self
             .registry
             .get(kind)
@@ -202,7 +207,7 @@ impl Router {
                 Refusal::unknown("type of agent", kind, self.registry.types().iter().map(|t| t.kind))
             })?
             .clone();
-        let old = &self.agents[at].kind;
+        let old = &self.agents[&id].kind;
         let same = old.ports.len() == new.ports.len()
             && old.ports.iter().zip(&new.ports).all(|(a, b)| {
                 a.name == b.name
@@ -219,39 +224,47 @@ impl Router {
         }
         let (_, table) = new.read_params(params).map_err(first)?;
         let body = new.build(params).map_err(first)?;
-        self.install(at, body, true, fabric)?;
-        let known = &mut self.agents[at];
-        known.spare = new.build(params).ok();
-        known.kind = new;
-        known.params = table;
-        known.plan.kind = kind.to_owned();
-        known.plan.params = params.clone();
+        let spare = new.build(params).ok();
+        staged.step(self.install(id, body, true));
+        let (kind, params) = (kind.to_owned(), params.clone());
+        self.alter(id, staged, move |known| {
+            known.spare = spare;
+            known.kind = new;
+            known.params = table;
+            known.plan.kind = kind;
+            known.plan.params = params;
+        });
         Ok(())
     }
 
     /// Puts a new instance in the place of the present one, in front of the same mailboxes and routes; on demand it takes over what
     /// that has learnt.
-    pub(super) fn install(
-        &mut self,
-        at: usize,
-        mut body: Box<dyn Body>,
-        hands_over: bool,
-        fabric: &mut dyn Fabric,
-    ) -> Reply<()> {
-        let known = &mut self.agents[at];
+    pub(super) fn install(&self, id: AgentId, mut body: Box<dyn Body>, hands_over: bool) -> Step {
+        let known = &self.agents[&id];
         let mut ends = known.ends.iter();
         body.visit_ports(&mut |visit| {
             if let Some(end) = ends.next() {
                 visit.port.bind(end);
             }
         });
-        let (executor, slot) = (known.executor, known.slot);
-        self.commit(executor, Change::Body { slot, body: Some(body), hands_over }, fabric)?;
-        let known = &mut self.agents[at];
-        known.state = AgentState::Running;
-        known.restart_at = Time::NEVER;
-        known.stats.restarts.store(known.stats.restarts.load(Relaxed) + 1, Relaxed);
-        Ok(())
+        let change = Change::Body { slot: known.slot, body: Some(body), hands_over };
+        Step { executor: known.executor, of: id, ring: None, what: What::Change(change) }
+    }
+
+    /// Changes what is known of an agent, so that it can be taken back.
+    fn alter(&mut self, id: AgentId, staged: &mut Staged, change: impl FnOnce(&mut Known)) {
+        let Some(known) = self.agents.get_mut(&id) else { return };
+        let (kind, plan, params, timing) =
+            (known.kind.clone(), known.plan.clone(), known.params.clone(), known.timing);
+        let (fault, output_faults) = (known.fault, known.output_faults.clone());
+        change(known);
+        staged.undo(move |router| {
+            router.of_mut(id, |known| {
+                known.spare = kind.build(&params).ok();
+                (known.kind, known.plan, known.params, known.timing) = (kind, plan, params, timing);
+                (known.fault, known.output_faults) = (fault, output_faults);
+            });
+        });
     }
 
     pub(super) fn set(
@@ -259,39 +272,40 @@ impl Router {
         name: &str,
         key: &str,
         value: types::value::Value,
-        fabric: &mut dyn Fabric,
+        staged: &mut Staged,
     ) -> Reply<()> {
-        let at = self.index(name)?;
+        let id = self.id_of(name)?;
         if matches!(key, "period" | "deadline" | "min_gap") {
-            return self.set_timing(at, key, &value, fabric);
+            return self.set_timing(id, key, &value, staged);
         }
-        let known = &self.agents[at];
+        let known = &self.agents[&id];
         let mut params = known.params.clone();
         params.set(key, value);
         let (boxed, table) = known.kind.read_params(&params).map_err(first)?;
-        let (executor, slot) = (known.executor, known.slot);
         let spare = known.kind.build(&table).ok();
-        self.commit(executor, Change::Params { slot, params: boxed }, fabric)?;
-        let known = &mut self.agents[at];
-        known.plan.params = table.clone();
-        known.params = table;
-        known.spare = spare;
+        let change = Change::Params { slot: known.slot, params: boxed };
+        staged.step(Step { executor: known.executor, of: id, ring: None, what: What::Change(change) });
+        self.alter(id, staged, move |known| {
+            known.plan.params = table.clone();
+            known.params = table;
+            known.spare = spare;
+        });
         Ok(())
     }
 
-    pub(super) fn set_timing(
+    fn set_timing(
         &mut self,
-        at: usize,
+        id: AgentId,
         key: &str,
         value: &types::value::Value,
-        fabric: &mut dyn Fabric,
+        staged: &mut Staged,
     ) -> Reply<()> {
         let text = value
             .as_text()
             .ok_or_else(|| Refusal::new(format!("{key} must be a time such as \"250ms\", not {value}")))?;
         let span: Duration =
             text.parse().map_err(|error| Refusal::new(format!("{key} is \"{text}\": {error}")))?;
-        let known = &self.agents[at];
+        let known = &self.agents[&id];
         let mut plan = known.plan.clone();
         match key {
             "period" => plan.period = Some(span),
@@ -307,34 +321,41 @@ impl Router {
             )));
         }
         let timing = timing_of(&plan)?;
-        let (executor, slot) = (known.executor, known.slot);
-        self.commit(executor, Change::Timing { slot, timing }, fabric)?;
-        let known = &mut self.agents[at];
-        known.plan = plan;
-        known.timing = timing;
+        let change = Change::Timing { slot: known.slot, timing };
+        staged.step(Step { executor: known.executor, of: id, ring: None, what: What::Change(change) });
+        self.alter(id, staged, move |known| (known.plan, known.timing) = (plan, timing));
         Ok(())
     }
 
-    pub(super) fn fault(&mut self, target: &str, fault: FaultKind, fabric: &mut dyn Fabric) -> Reply<()> {
-        if let Ok(at) = self.index(target) {
-            let known = &self.agents[at];
-            let (executor, slot) = (known.executor, known.slot);
+    pub(super) fn fault(&mut self, target: &str, fault: FaultKind, staged: &mut Staged) -> Reply<()> {
+        if let Ok(id) = self.id_of(target) {
             let step = fault.of_step();
             if step.is_none() || fault == FaultKind::Ok {
                 let output = fault.of_output().unwrap_or_default();
-                let ends: Vec<_> = known.ends.iter().filter_map(|end| end.output.clone()).collect();
-                for end in ends {
-                    self.output_fault(executor, end, output, fabric)?;
+                for port in 0..self.agents[&id].ends.len() {
+                    self.output_fault(id, port, output, staged);
                 }
             }
-            return step.map_or(Ok(()), |fault| self.commit(executor, Change::Fault { slot, fault }, fabric));
+            if let Some(fault) = step {
+                let known = &self.agents[&id];
+                let change = Change::Fault { slot: known.slot, fault };
+                let executor = known.executor;
+                staged.step(Step { executor, of: id, ring: None, what: What::Change(change) });
+                // To panic or hang is for once.
+                let lasts = matches!(fault, StepFault::Off | StepFault::Slow);
+                let fault = if lasts { fault } else { StepFault::None };
+                self.alter(id, staged, move |known| known.fault = fault);
+            }
+            return Ok(());
         }
         let (agent, port) = self.port(target).map_err(|refusal| {
-            if target.contains('.') { refusal } else { self.index(target).err().unwrap_or(refusal) }
+            if target.contains('.') { refusal } else { self.id_of(target).err().unwrap_or(refusal) }
         })?;
-        let end = self.agents[agent].ends[port].output.clone();
-        match (end, fault.of_output()) {
-            (Some(end), Some(fault)) => self.output_fault(self.agents[agent].executor, end, fault, fabric),
+        match (&self.agents[&agent].ends[port].output, fault.of_output()) {
+            (Some(_), Some(fault)) => {
+                self.output_fault(agent, port, fault, staged);
+                Ok(())
+            }
             (None, _) => {
                 Err(Refusal::new(format!("{target} sends nothing")).help("name an output, or the agent"))
             }
@@ -344,26 +365,50 @@ impl Router {
         }
     }
 
-    pub(super) fn output_fault(
-        &mut self,
-        executor: usize,
-        end: Arc<dyn OutputEnd>,
-        fault: OutputFault,
-        fabric: &mut dyn Fabric,
-    ) -> Reply<()> {
+    fn output_fault(&mut self, id: AgentId, port: usize, fault: OutputFault, staged: &mut Staged) {
+        let known = &self.agents[&id];
+        let Some(end) = known.ends[port].output.clone() else { return };
         let faulty = end.prepare_fault(fault);
-        self.commit(executor, Change::OutputFault { end, faulty }, fabric)
+        let change = Change::OutputFault { end, faulty, slot: known.slot };
+        staged.step(Step { executor: known.executor, of: id, ring: None, what: What::Change(change) });
+        self.alter(id, staged, move |known| known.output_faults[port] = fault);
     }
 
-    pub(super) fn send(&mut self, port: &str, bytes: &[u8], fabric: &mut dyn Fabric) -> Reply<()> {
+    pub(super) fn send(&mut self, port: &str, bytes: &[u8], staged: &mut Staged) -> Reply<()> {
         let (agent, place) = self.port(port)?;
-        let Some(end) = self.agents[agent].ends[place].output.clone() else {
+        let known = &self.agents[&agent];
+        let Some(end) = known.ends[place].output.clone() else {
             return Err(Refusal::new(format!("{port} takes messages but sends none")).help(
                 "name the output from which the message shall go, and all who are wired to it get it",
             ));
         };
-        let executor = self.agents[agent].executor;
         let message = end.prepare_message(bytes).map_err(|error| Refusal::new(error.to_string()))?;
-        self.commit(executor, Change::Send { end, message, envelope: Envelope::default() }, fabric)
+        let change = Change::Send { end, message, envelope: Envelope::default(), slot: known.slot };
+        staged.step(Step { executor: known.executor, of: agent, ring: None, what: What::Change(change) });
+        Ok(())
     }
+}
+
+/// Makes what stands behind the ports of an agent.
+pub(super) fn new_ends(
+    plan: &AgentPlan,
+    kind: &AgentType,
+    body: &mut dyn Body,
+    readers: &[usize],
+) -> Reply<Vec<PortEnds>> {
+    let mut ends: Vec<PortEnds> = Vec::new();
+    body.visit_ports(&mut |visit| {
+        let seats = readers.get(ends.len()).copied().unwrap_or(0) + SPARE_SEATS;
+        let made = visit.port.create(&visit.options, seats);
+        visit.port.bind(&made);
+        ends.push(made);
+    });
+    for input in &plan.on {
+        let place = kind.ports.iter().position(|port| port.name == input);
+        if place.is_none_or(|place| ends[place].input.is_none()) {
+            let known = kind.ports.iter().filter(|port| port.shape.input.is_some()).map(|port| port.name);
+            return Err(Refusal::unknown(&format!("input of {}", plan.name), input, known));
+        }
+    }
+    Ok(ends)
 }

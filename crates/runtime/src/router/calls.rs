@@ -15,10 +15,12 @@ use std::sync::mpsc::SyncSender;
 use types::definition::Definition;
 use types::{AgentId, Category, Duration, Filter, Priority, Time};
 
-use super::{AgentState, Fabric, Reply, Router};
+use super::script::{Cut, Step, Tally, What};
+use super::{AgentState, Fabric, PortId, Reply, Router};
 use crate::executor::Change;
 use crate::port::{
-    Direction, Envelope, InputEnd, NoSeat, OutputEnd, PreparedWire, Target, WireCounts, WireId, WireSpec,
+    Direction, Envelope, InputEnd, NoSeat, OutputEnd, PortEnds, PreparedWire, Target, WireCounts, WireId,
+    WireSpec,
 };
 use crate::request::Refusal;
 use crate::ring::Overload;
@@ -58,21 +60,21 @@ impl OutsideCall {
 pub(super) struct UnderWay {
     call: OutsideCall,
     deadline: Time,
-    agent: AgentId,
-    port: usize,
+    service: PortId,
     question: WireId,
+    asked: Arc<WireCounts>,
     answer: WireId,
     /// Where the answer comes in. Only the control side touches it.
     answers: Arc<dyn InputEnd>,
 }
 
-/// The agent, the port and the ends of a service.
-type Ends = (usize, usize, Arc<dyn InputEnd>, Arc<dyn OutputEnd>);
+/// A service and its ends.
+type Ends = (PortId, Arc<dyn InputEnd>, Arc<dyn OutputEnd>);
 
 impl Router {
     /// What a service takes and gives.
     pub(crate) fn service(&self, port: &str) -> Reply<ServiceShape> {
-        let (_, _, calls, answers) = self.service_ends(port)?;
+        let (_, calls, answers) = self.service_ends(port)?;
         Ok(ServiceShape {
             question: (calls.message_type().definition)(),
             answer: (answers.message_type().definition)(),
@@ -90,11 +92,11 @@ impl Router {
             Some((agent, port)) => Err(unknown(self.known(agent)?, port)),
             None => Err(refusal),
         })?;
-        let known = &self.agents[agent];
+        let known = &self.agents[&agent];
         let (shape, ends) = (&known.kind.ports[port], &known.ends[port]);
         match (shape.shape.direction, &ends.input, &ends.output) {
             (Direction::Service, Some(calls), Some(answers)) => {
-                Ok((agent, port, calls.clone(), answers.clone()))
+                Ok(((agent, port), calls.clone(), answers.clone()))
             }
             _ => Err(unknown(known, shape.name)),
         }
@@ -110,8 +112,10 @@ impl Router {
     }
 
     fn begin_call(&mut self, call: OutsideCall, now: Time, fabric: &mut dyn Fabric) -> Reply<()> {
-        let (agent, port, calls, answers) = self.service_ends(&call.service)?;
-        let known = &self.agents[agent];
+        self.now = now;
+        let (service, calls, answers) = self.service_ends(&call.service)?;
+        let (id, port) = service;
+        let known = &self.agents[&id];
         if known.state == AgentState::Dead {
             return Err(Refusal::new(format!("{} is dead and answers no calls", known.plan.name))
                 .help("restart it, and call again"));
@@ -120,42 +124,50 @@ impl Router {
             return Err(Refusal::new(format!("{CALLS} calls from outside are under way already"))
                 .help("wait for the answers"));
         }
-        let (executor, slot, id) = (known.executor, known.slot, known.id);
+        let (executor, slot, wakes, rings) =
+            (known.executor, known.slot, known.wakes(port), known.rings[port]);
+        let priorities = known.priorities(port);
         let deadline = now.saturating_add(call.within);
         // Numbers from the other end: those of agents stay what they are without the call.
         self.next_caller -= 1;
         let caller = AgentId(self.next_caller);
 
         let questions = calls.facing();
-        questions.set_sender(caller);
+        questions.set_sender(caller, 0);
         let message =
             questions.prepare_message(&call.cdr).map_err(|error| Refusal::new(error.to_string()))?;
-        let wakes = known.plan.on.iter().any(|on| on == known.kind.ports[port].name);
         let asking = self.spec(executor, slot, wakes, Filter::ALL);
-        let lanes = self.lanes_into((id, port));
+        let lanes = rings.into * Priority::ALL.len();
         let PreparedWire { mut route, lanes } = prepared(&questions, &asking, &[Priority::Normal], 0, lanes)?;
         // Nobody else has these ends yet, so they are touched here.
         questions.add_route(route.as_mut());
 
         let facing = answers.facing();
         let answering = self.spec(executor, slot, false, answers_for(caller));
-        let priorities = self.agents[agent].priorities(port);
-        let routes = self.routes_from((id, port));
-        let PreparedWire { route, lanes: mut back } = prepared(&answers, &answering, &priorities, routes, 0)?;
+        let PreparedWire { route, lanes: mut back } =
+            prepared(&answers, &answering, &priorities, rings.out, 0)?;
         facing.join(back.as_mut());
 
         let envelope = Envelope { deadline, marker: 1, category: Category::Call, ..Envelope::default() };
-        let (question, answer) = (asking.id, answering.id);
-        let under_way = UnderWay { call, deadline, agent: id, port, question, answer, answers: facing };
-        let asked = self
-            .commit(executor, Change::Route { end: answers, route }, fabric)
-            .and_then(|()| self.commit(executor, Change::Join { end: calls, lanes, slot }, fabric))
-            .and_then(|()| self.commit(executor, Change::Send { end: questions, message, envelope }, fabric));
-        match asked {
-            Ok(()) => self.calls.push(under_way),
-            Err(_) => self.hang_up(&under_way, fabric),
-        }
-        asked
+        let (question, answer, asked) = (asking.id, answering.id, asking.counts.clone());
+        self.calls.push(UnderWay { call, deadline, service, question, asked, answer, answers: facing });
+        self.of_mut(id, |known| {
+            known.joined(port, 1);
+            known.routed(port, 1);
+        });
+        let steps = [
+            (answer, Change::Route { end: answers, route, slot }),
+            (question, Change::Join { end: calls, lanes, slot }),
+            (question, Change::Send { end: questions, message, envelope, slot }),
+        ];
+        let steps = steps.map(|(ring, change)| {
+            let (ring, what) = (Some(ring), What::Change(change));
+            Step { executor, of: id, ring, what }
+        });
+        // Nobody waits for its executor: who asks is told when the time is over.
+        self.begin(steps.into());
+        self.advance(fabric);
+        Ok(())
     }
 
     /// A wire for one message to or from the agent in a slot.
@@ -168,6 +180,7 @@ impl Router {
 
     /// Passes on the answers that have come, and tells those who have waited long enough. Gives the time of the next deadline.
     pub(crate) fn answer_calls(&mut self, now: Time, fabric: &mut dyn Fabric) -> Time {
+        self.now = now;
         let mut next = Time::NEVER;
         let mut at = 0;
         while let Some(under_way) = self.calls.get(at) {
@@ -193,33 +206,41 @@ impl Router {
         !self.calls.is_empty()
     }
 
-    /// Takes the ends of a call away from the service.
+    /// Takes the ends of a call away from the service: when its executor comes to it, and nobody waits for that.
     fn hang_up(&mut self, under_way: &UnderWay, fabric: &mut dyn Fabric) {
-        let Some(known) = self.by_id(under_way.agent) else { return };
-        let (executor, ends) = (known.executor, known.ends[under_way.port].clone());
-        if let Some(end) = ends.output {
-            self.forget(executor, end, under_way.answer, fabric);
-        }
-        if let Some(end) = ends.input {
-            self.leave(executor, end, under_way.question, true, fabric);
-        }
+        let (id, port) = under_way.service;
+        let Some(known) = self.by_id(id) else { return };
+        let (executor, slot) = (known.executor, known.slot);
+        let PortEnds { input: Some(input), output: Some(output) } = known.ends[port].clone() else { return };
+        let into = output.forgetting_box();
+        let forget = Change::Forget { end: output, wire: under_way.answer, into, slot };
+        let cut = Cut {
+            slot,
+            to: under_way.service,
+            from: under_way.service,
+            end: input,
+            ring: under_way.question,
+            counts: under_way.asked.clone(),
+            overload: Overload::Refuse,
+            into: Tally::Nowhere,
+            until: self.now,
+        };
+        let step = |what| Step { executor, of: id, ring: None, what };
+        self.begin(vec![step(What::Change(forget)), step(What::Cut(cut))]);
+        self.advance(fabric);
     }
 
-    /// The agent is about to go, and with it all that its callers wait for.
-    pub(super) fn end_calls_of(&mut self, agent: AgentId) {
+    /// The agent is gone or about to go, and with it all that its callers wait for.
+    pub(super) fn end_calls_of(&mut self, agent: AgentId, why: &str) {
         self.calls.retain(|under_way| {
-            if under_way.agent == agent {
-                let what = format!("{} was removed before it answered", under_way.call.service);
+            let is_its = under_way.service.0 == agent;
+            if is_its {
+                let what = format!("{} {why}", under_way.call.service);
                 // Whoever asked may be gone.
                 let _ = under_way.call.asker.send(Err(Refusal::new(what)));
             }
-            under_way.agent != agent
+            !is_its
         });
-    }
-
-    /// How many calls from outside go to a port.
-    pub(super) fn calls_of(&self, port: (AgentId, usize)) -> usize {
-        self.calls.iter().filter(|under_way| (under_way.agent, under_way.port) == port).count()
     }
 }
 

@@ -1,14 +1,16 @@
 //! What happens when agents die.
 
-use core::sync::atomic::Ordering::Relaxed;
-
 use types::{AgentId, Duration, Time};
 
-use super::{Fabric, Incident, Router, Wire};
-use crate::executor::{Answer, Cause, Change, RawCause};
-use crate::plan::{OnDeath, WirePlan};
-use crate::port::{PortEnds, WireId};
-use crate::request::AgentState;
+use super::agents::new_ends;
+use super::script::{Step, Tally, What};
+use super::{Fabric, Incident, Known, Reply, Rings, Router, Wire};
+use crate::agent::Body;
+use crate::executor::{Cause, RawCause};
+use crate::plan::OnDeath;
+use crate::port::{OutputFault, WireCounts, WireId};
+use crate::request::{AgentState, Refusal, WireTotals};
+use crate::ring::Overload;
 
 /// Restart waits this long after the first death, and twice as long after each that follows.
 const FIRST_PAUSE: Duration = Duration::millis(100);
@@ -18,133 +20,86 @@ const MOST_RESTARTS: usize = 5;
 const RESTARTS_WITHIN: Duration = Duration::secs(60);
 
 impl Router {
-    /// Looks for deaths, and starts again who is due. Gives the time at which it wants to look again.
+    /// Looks for deaths, starts again who is due, and goes on with what is not done yet. Gives the time at which it wants to look
+    /// again.
     pub(crate) fn supervise(&mut self, now: Time, fabric: &mut dyn Fabric) -> Time {
-        for executor in 0..self.executors.len() {
-            while let Some(answer) = self.executors[executor].link.answer() {
-                self.died.push((executor, answer));
-            }
-        }
-        for (executor, answer) in core::mem::take(&mut self.died) {
-            if let Answer::Died { slot, id, time, cause, body } = answer {
-                let hung = matches!(cause, RawCause::Hang);
-                self.bury(executor, slot, id, time, cause);
-                drop(body);
-                if hung {
-                    self.renew(id, fabric);
-                }
-            }
-        }
-        if self.restarting == 0 {
-            return Time::NEVER;
-        }
-        self.restarting = self.agents.iter().filter(|known| known.state == AgentState::Restarting).count();
+        self.now = now;
+        self.take_answers();
         let mut next = Time::NEVER;
-        for at in 0..self.agents.len() {
-            let known = &mut self.agents[at];
-            if known.state != AgentState::Restarting {
-                continue;
-            }
-            if known.restart_at > now {
-                next = next.min(known.restart_at);
-                continue;
-            }
-            let body = known.spare.take().map_or_else(|| known.kind.build(&known.params), Ok);
-            match body {
-                Ok(body) => {
-                    let name = known.plan.name.clone();
-                    match self.install(at, body, false, fabric) {
-                        Ok(()) => self.incidents.push(Incident {
-                            time: now,
-                            agent: name,
-                            what: "started again".into(),
-                        }),
-                        Err(refusal) => {
-                            self.incidents.push(Incident {
-                                time: now,
-                                agent: name,
-                                what: format!("not started again: {refusal}"),
-                            });
-                            self.agents[at].state = AgentState::Dead;
-                        }
-                    }
-                    let known = &mut self.agents[at];
-                    known.spare = known.kind.build(&known.params).ok();
-                }
-                Err(_) => known.state = AgentState::Dead,
+        if self.restarting > 0 {
+            next = self.restart_who_is_due();
+        }
+        if self.has_to_do() {
+            next = next.min(self.ask_again());
+            self.advance(fabric);
+        }
+        next
+    }
+
+    fn restart_who_is_due(&mut self) -> Time {
+        let waits = |known: &&Known| known.state == AgentState::Restarting;
+        let waiting: Vec<(AgentId, Time, bool)> = (self.agents.values().filter(waits))
+            .map(|known| (known.id, known.restart_at, known.starting))
+            .collect();
+        self.restarting = waiting.len();
+        let mut next = Time::NEVER;
+        for (id, at, _) in waiting.into_iter().filter(|(_, _, starting)| !starting) {
+            if at > self.now {
+                next = next.min(at);
+            } else if let Err(refusal) = self.start_again(id) {
+                self.of_mut(id, |known| known.state = AgentState::Dead);
+                self.say_of(id, format!("left dead, for it cannot be built: {refusal}"));
             }
         }
         next
     }
 
-    /// Gives an agent whose step did not return new ports and a new number. Its old ones may still be in use by the step: they
-    /// are left to it, nobody listens to them any more, and nobody sends to them.
-    pub(super) fn renew(&mut self, id: AgentId, fabric: &mut dyn Fabric) {
-        let Some(at) = self.agents.iter().position(|known| known.id == id) else { return };
-        let touched = |wire: &Wire| wire.from.0 == id || wire.to.0 == id;
-        let plans: Vec<WirePlan> = self
-            .wires
-            .iter()
-            .filter(|wire| touched(wire) && !wire.is_answer)
-            .map(|wire| self.plan_of(wire))
-            .collect();
-        type Ends = (WireId, (AgentId, usize), (AgentId, usize));
-        let old: Vec<Ends> = self
-            .wires
-            .iter()
-            .filter(|wire| touched(wire))
-            .map(|wire| (wire.id, wire.from, wire.to))
-            .collect();
-        for (wire, from, to) in old {
-            let side = |id: AgentId, port: usize| {
-                self.by_id(id).map(|known| (known.executor, known.ends[port].clone()))
-            };
-            // What an executor does not let go of now, it does when it answers again.
-            if from.0 != id
-                && let Some((executor, PortEnds { output: Some(end), .. })) = side(from.0, from.1)
-            {
-                self.forget(executor, end, wire, fabric);
-            } else if to.0 != id
-                && let Some((executor, PortEnds { input: Some(end), .. })) = side(to.0, to.1)
-            {
-                self.leave(executor, end, wire, true, fabric);
-            }
-        }
-        self.wires.retain(|wire| wire.from.0 != id && wire.to.0 != id);
-        let known = self.agents.remove(at);
-        let _ = self.commit(known.executor, Change::Unseat { slot: known.slot, seat: None }, fabric);
-        self.executors[known.executor].slots[known.slot as usize] = false;
-        if self.add(known.plan, &[], fabric).is_err() {
-            return;
-        }
-        for plan in plans {
-            let _ = self.wire(&plan, fabric);
-        }
-        if let Some(new) = self.agents.last_mut() {
-            (new.deaths, new.last_death, new.restart_at) = (known.deaths, known.last_death, known.restart_at);
-            new.state = known.state;
-            let hangs = known.stats.hangs.load(Relaxed);
-            new.stats.hangs.store(hangs, Relaxed);
-            new.stats.restarts.store(known.stats.restarts.load(Relaxed), Relaxed);
-            let (executor, slot) = (new.executor, new.slot);
-            // It waits for its restart like everybody who died.
-            let _ = self.commit(executor, Change::Body { slot, body: None, hands_over: false }, fabric);
-        }
+    /// Has another instance put in the place of one that died. Its executor does so when it comes to it.
+    fn start_again(&mut self, id: AgentId) -> Reply<()> {
+        let Some(known) = self.agents.get_mut(&id) else { return Ok(()) };
+        let body = built(known)?;
+        known.spare = known.kind.build(&known.params).ok();
+        known.starting = true;
+        let step = self.install(id, body, false);
+        self.begin(vec![step]);
+        Ok(())
     }
 
-    pub(super) fn bury(&mut self, executor: usize, slot: u32, id: AgentId, time: Time, cause: RawCause) {
-        let _ = executor;
+    fn say_of(&mut self, id: AgentId, what: String) {
+        let agent = match self.by_id(id) {
+            Some(known) => known.plan.name.clone(),
+            None => self.directory.name(id).map_or_else(String::new, |name| name.as_str().to_owned()),
+        };
+        self.incidents.push(Incident { time: self.now, agent, what });
+    }
+
+    /// An executor says that an agent died.
+    pub(super) fn died(&mut self, slot: u32, id: AgentId, time: Time, cause: RawCause) {
+        let lost = matches!(cause, RawCause::Hang | RawCause::Stop);
         let cause = match cause {
             RawCause::Fault(fault) => Cause::Fault(fault),
             RawCause::Hang => Cause::Hang,
+            RawCause::Stop => Cause::Stop,
             RawCause::Panic(record, payload) => {
                 drop(payload);
                 Cause::Panic(record.to_text())
             }
         };
-        let Some(known) = self.agents.iter_mut().find(|known| known.id == id && known.slot == slot) else {
-            return;
-        };
+        if self.by_id(id).is_some_and(|known| known.slot == slot) {
+            self.bury(id, time, &cause);
+            if lost {
+                self.renew(id);
+            }
+        } else if lost {
+            // It was removed meanwhile, or that is where it is lost.
+            self.abandon(id, &[]);
+            self.say_of(id, format!("{cause}; it was removed"));
+        }
+    }
+
+    fn bury(&mut self, id: AgentId, time: Time, cause: &Cause) {
+        let Some(known) = self.agents.get_mut(&id) else { return };
+        known.starting = false;
         known.last_death = Some(cause.to_string());
         known.deaths.retain(|death| *death + RESTARTS_WITHIN > time);
         known.deaths.push(time);
@@ -164,4 +119,101 @@ impl Router {
         }
         self.incidents.push(Incident { time, agent: known.plan.name.clone(), what });
     }
+
+    /// Gives an agent that is lost in a step new ports under its old number. Its old ones may still be in use there: they are left to
+    /// it, nobody listens to them any more, and nobody sends to them.
+    fn renew(&mut self, id: AgentId) {
+        let Some(known) = self.by_id(id) else { return };
+        let touching: Vec<Wire> =
+            known.wires.iter().filter_map(|wire| self.wires.get(wire)).cloned().collect();
+        let rings: Vec<WireId> = touching.iter().map(|wire| wire.ring).collect();
+        self.abandon(id, &rings);
+        self.end_calls_of(id, "does not return from its step");
+        if let Err(refusal) = self.new_ports(id) {
+            self.of_mut(id, |known| known.state = AgentState::Dead);
+            self.say_of(id, format!("left dead, for it cannot be built: {refusal}"));
+            return;
+        }
+        let known = &self.agents[&id];
+        // What stands ready for the next hand-over is used up.
+        let mut steps = vec![self.order_step(known.executor), self.seat_step(known, None)];
+        for old in touching {
+            let mut wire = Wire { ring: self.wire_id(), counts: Default::default(), ..old.clone() };
+            match self.connect(&wire) {
+                Ok(made) => steps.extend(made),
+                Err(refusal) => self.lose(&wire, refusal),
+            }
+            // The sender forgets the old ring when it has the new one, so that no message of it falls between the two.
+            if old.from.0 != id {
+                steps.extend(self.forget_step(&old));
+            }
+            if old.to.0 == id {
+                wire.past += totals(&old.counts, old.overload);
+            } else if let Some((executor, mut cut)) =
+                self.cut_of(&old, Tally::Wire(old.id, WireTotals::default()), self.now)
+            {
+                cut.from = (AgentId::NONE, 0);
+                let of = cut.to.0;
+                steps.push(Step { executor, of, ring: None, what: What::Cut(cut) });
+            }
+            if let Some(listed) = self.wires.get_mut(&old.id) {
+                *listed = wire;
+            }
+        }
+        self.begin(steps);
+    }
+
+    /// A wire that cannot be made again.
+    fn lose(&mut self, wire: &Wire, refusal: Refusal) {
+        let plan = self.plan_of(wire);
+        self.say_of(wire.from.0, format!("the wire from {} to {} is lost: {refusal}", plan.from, plan.to));
+        let lost = self.unlist(wire.id).and_then(|wire| wire.partner);
+        if let Some(partner) = lost {
+            self.unlist(partner);
+        }
+    }
+
+    fn new_ports(&mut self, id: AgentId) -> Reply<()> {
+        let Some(known) = self.agents.get_mut(&id) else { return Ok(()) };
+        let mut body = built(known)?;
+        let outs = known.rings.iter().map(|rings| rings.out).collect::<Vec<_>>();
+        let made = new_ends(&known.plan, &known.kind, body.as_mut(), &outs)?;
+        for (new, old) in made.iter().zip(&known.ends) {
+            if let (Some(new), Some(old)) = (&new.output, &old.output) {
+                // What is sent in the lost step from now on is not of the run any more.
+                old.set_log(u32::MAX, 0);
+                new.set_sender(id, old.sent());
+            }
+        }
+        for (end, fault) in made.iter().zip(&known.output_faults) {
+            if let Some(output) = &end.output
+                && *fault != OutputFault::None
+            {
+                // Nobody else has it yet.
+                output.set_fault(output.prepare_fault(*fault).as_mut());
+            }
+        }
+        known.spare = Some(body);
+        known.ends = made;
+        known.rings.fill(Rings::default());
+        let (name, kind, ends) = (known.plan.name.clone(), known.kind.clone(), known.ends.clone());
+        self.number_outputs(&name, &kind, &ends);
+        Ok(())
+    }
+}
+
+/// An instance, made ahead or now.
+fn built(known: &mut Known) -> Reply<Box<dyn Body>> {
+    match known.spare.take() {
+        Some(body) => Ok(body),
+        None => known.kind.build(&known.params).map_err(super::first),
+    }
+}
+
+/// What went over a ring that is no more. What was in it still is lost.
+pub(super) fn totals(counts: &WireCounts, overload: Overload) -> WireTotals {
+    let mut totals = WireTotals::of(counts);
+    let displaced = if overload == Overload::NewestWins { totals.dropped } else { 0 };
+    totals.dropped += totals.sent.saturating_sub(totals.taken + totals.expired + displaced);
+    totals
 }

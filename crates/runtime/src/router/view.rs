@@ -6,14 +6,14 @@ use types::{Duration, Time};
 
 use super::{Known, Router, Wire};
 use crate::allocations;
-use crate::request::{AgentView, Counts, ExecutorView, PortView, SystemView, WireView};
+use crate::request::{AgentView, Counts, ExecutorView, PortView, SystemView, WireTotals, WireView};
 
 impl Router {
     /// What there is, as people ask for it.
     pub(crate) fn view(&self, now: Time) -> SystemView {
-        let agents = self.agents.iter().map(|known| self.view_agent(known)).collect();
+        let agents = self.in_order().into_iter().map(|known| self.view_agent(known)).collect();
         let wires =
-            self.wires.iter().filter(|wire| !wire.is_answer).map(|wire| self.view_wire(wire)).collect();
+            self.wires.values().filter(|wire| !wire.is_answer).map(|wire| self.view_wire(wire)).collect();
         let executors = self.executors.iter().map(|executor| ExecutorView {
             name: executor.plan.name.clone(),
             real_time: executor.plan.priority.is_some(),
@@ -26,6 +26,7 @@ impl Router {
             allocations_watched: allocations::are_watched(),
             agents,
             wires,
+            past: self.past,
         }
     }
 
@@ -82,6 +83,8 @@ impl Router {
             .by_id(wire.from.0)
             .and_then(|known| known.ends[wire.from.1].output.as_ref())
             .map_or("", |end| end.message_type().short_name());
+        let mut totals = WireTotals::of(&wire.counts);
+        totals += wire.past;
         WireView {
             from: plan.from,
             to: plan.to,
@@ -89,11 +92,11 @@ impl Router {
             depth: wire.depth,
             overload: wire.overload,
             filter: plan.filter,
-            sent: wire.counts.sent.load(Relaxed),
-            dropped: wire.counts.dropped.load(Relaxed),
-            refused: wire.counts.refused.load(Relaxed),
-            taken: wire.counts.taken.load(Relaxed),
-            expired: wire.counts.expired.load(Relaxed),
+            sent: totals.sent,
+            dropped: totals.dropped,
+            refused: totals.refused,
+            taken: totals.taken,
+            expired: totals.expired,
         }
     }
 }

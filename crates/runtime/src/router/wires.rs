@@ -2,25 +2,24 @@
 
 use std::sync::Arc;
 
-use types::{AgentId, Filter, Priority};
-
-use super::{Committed, Fabric, Owed, OwedEnd, Reply, Router, Wire};
+use super::script::{Cut, DRAINS_WITHIN, Step, Tally, What};
+use super::{PortId, Reply, Router, Staged, Wire};
 use crate::executor::Change;
 use crate::plan::{USUAL_DEPTH, USUAL_DEPTH_ON, WirePlan};
-use crate::port::{Direction, InputEnd, NoSeat, OutputEnd, PortEnds, Target, WireCounts, WireId, WireSpec};
-use crate::request::Refusal;
+use crate::port::{Direction, NoSeat, Target, WireCounts, WireId, WireSpec};
+use crate::request::{Refusal, WireTotals};
 use crate::ring::Overload;
 use crate::service::answers_for;
+use types::{Filter, Priority, Time};
 
 impl Router {
-    pub(super) fn find_wire(&self, from: &str, to: &str) -> Option<&Wire> {
-        let (from, to) = (self.port(from).ok()?, self.port(to).ok()?);
-        let (from, to) = ((self.agents[from.0].id, from.1), (self.agents[to.0].id, to.1));
-        self.wires.iter().find(|wire| wire.from == from && wire.to == to && !wire.is_answer)
+    fn find_wire(&self, from: PortId, to: PortId) -> Option<&Wire> {
+        let wires = self.agents.get(&from.0)?.wires.iter().filter_map(|id| self.wires.get(id));
+        wires.into_iter().find(|wire| wire.from == from && wire.to == to && !wire.is_answer)
     }
 
     pub(super) fn plan_of(&self, wire: &Wire) -> WirePlan {
-        let name = |(id, port): (AgentId, usize)| {
+        let name = |(id, port): PortId| {
             self.by_id(id).map_or_else(String::new, |known| {
                 format!("{}.{}", known.plan.name, known.kind.ports[port].name)
             })
@@ -32,27 +31,26 @@ impl Router {
     }
 
     /// Makes a wire.
-    pub(crate) fn wire(&mut self, plan: &WirePlan, fabric: &mut dyn Fabric) -> Reply<()> {
+    pub(crate) fn wire(&mut self, plan: &WirePlan, staged: &mut Staged) -> Reply<()> {
         let (from, to) = (self.port(&plan.from)?, self.port(&plan.to)?);
-        if self.find_wire(&plan.from, &plan.to).is_some() {
+        if self.find_wire(from, to).is_some() {
             return Err(Refusal::new(format!("{} is already wired to {}", plan.from, plan.to)));
         }
-        let recipient = plan.filter.recipient.as_ref().map(|name| self.known(name)).transpose()?;
-        let filter = plan.filter.with_recipient(recipient.map(|known| known.id));
-        let (out_port, in_port) =
-            (&self.agents[from.0].kind.ports[from.1], &self.agents[to.0].kind.ports[to.1]);
+        let recipient = plan.filter.recipient.as_ref().map(|name| self.id_of(name)).transpose()?;
+        let filter = plan.filter.with_recipient(recipient);
+        let (sender, receiver) = (&self.agents[&from.0], &self.agents[&to.0]);
+        let (out_port, in_port) = (&sender.kind.ports[from.1], &receiver.kind.ports[to.1]);
         match (out_port.shape.direction, in_port.shape.direction) {
             (Direction::Output, Direction::Input) => {
                 self.check_types(plan, from, to)?;
-                self.join(from, to, plan, filter, false, fabric).map(drop)
+                self.lay(from, to, plan, filter, false, staged).map(drop)
             }
             (Direction::Client, Direction::Service) => {
                 self.check_types(plan, from, to)?;
                 self.check_types(plan, to, from)?;
-                let for_client = answers_for(self.agents[from.0].id);
-                let answers = self.join(to, from, plan, for_client, true, fabric)?;
-                let calls = self.join(from, to, plan, filter, false, fabric)?;
-                if let Some(wire) = self.wires.iter_mut().find(|wire| wire.id == calls) {
+                let answers = self.lay(to, from, plan, answers_for(from.0), true, staged)?;
+                let calls = self.lay(from, to, plan, filter, false, staged)?;
+                if let Some(wire) = self.wires.get_mut(&calls) {
                     wire.partner = Some(answers);
                 }
                 Ok(())
@@ -68,26 +66,18 @@ impl Router {
         }
     }
 
-    fn check_types(&self, plan: &WirePlan, from: (usize, usize), to: (usize, usize)) -> Reply<()> {
-        let out = self.agents[from.0].ends[from.1].output.as_ref().map(|end| end.message_type());
-        let into = self.agents[to.0].ends[to.1].input.as_ref().map(|end| end.message_type());
+    fn check_types(&self, plan: &WirePlan, from: PortId, to: PortId) -> Reply<()> {
+        let (sender, receiver) = (&self.agents[&from.0], &self.agents[&to.0]);
+        let out = sender.ends[from.1].output.as_ref().map(|end| end.message_type());
+        let into = receiver.ends[to.1].input.as_ref().map(|end| end.message_type());
         match (out, into) {
             (Some(out), Some(into)) if out == into => Ok(()),
             (Some(out), Some(into)) => {
-                let fits: Vec<String> = self.agents[from.0]
-                    .kind
-                    .ports
-                    .iter()
-                    .filter(|port| port.shape.output == Some(into))
-                    .map(|port| format!("{}.{}", self.agents[from.0].plan.name, port.name))
-                    .collect();
-                let refusal = Refusal::new(format!(
-                    "{} sends {}, {} takes {}",
-                    plan.from,
-                    out.short_name(),
-                    plan.to,
-                    into.short_name()
-                ));
+                let fitting = sender.kind.ports.iter().filter(|port| port.shape.output == Some(into));
+                let fits: Vec<String> =
+                    fitting.map(|port| format!("{}.{}", sender.plan.name, port.name)).collect();
+                let (sends, takes) = (out.short_name(), into.short_name());
+                let refusal = Refusal::new(format!("{} sends {sends}, {} takes {takes}", plan.from, plan.to));
                 Err(if fits.is_empty() {
                     refusal
                 } else {
@@ -98,70 +88,99 @@ impl Router {
         }
     }
 
-    /// Makes one ring wire: the receiver joins, then the sender adds.
-    fn join(
+    /// Makes one wire of rings: the receiver joins, then the sender adds.
+    fn lay(
         &mut self,
-        from: (usize, usize),
-        to: (usize, usize),
+        from: PortId,
+        to: PortId,
         plan: &WirePlan,
-        filter: Filter,
+        passes: Filter,
         is_answer: bool,
-        fabric: &mut dyn Fabric,
+        staged: &mut Staged,
     ) -> Reply<WireId> {
-        let (sender, receiver) = (&self.agents[from.0], &self.agents[to.0]);
-        let (Some(output), Some(input)) =
-            (sender.ends[from.1].output.clone(), receiver.ends[to.1].input.clone())
-        else {
-            return Err(Refusal::new(format!("{} cannot be wired to {}", plan.from, plan.to)));
-        };
-        let port = &receiver.kind.ports[to.1];
-        let answers = port.shape.direction == Direction::Client;
-        let wakes = answers || receiver.plan.on.iter().any(|on| on == port.name);
+        let wakes = self.agents[&to.0].wakes(to.1);
         let depth = plan.depth.unwrap_or(if wakes { USUAL_DEPTH_ON } else { USUAL_DEPTH });
         let overload = plan.overload.unwrap_or(if wakes { Overload::Refuse } else { Overload::NewestWins });
         if depth == 0 || depth > crate::ring::MOST_MESSAGES {
             let most = crate::ring::MOST_MESSAGES;
             return Err(Refusal::new(format!("a wire holds from 1 to {most} messages, not {depth}")));
         }
-        let target = Target {
-            executor: receiver.executor as u32,
-            slot: receiver.slot,
-            door: self.executors[receiver.executor].link.door.clone(),
-            wakes,
-        };
         let id = self.wire_id();
-        let (sender, receiver) = (&self.agents[from.0], &self.agents[to.0]);
-        let counts = Arc::new(WireCounts::default());
-        let spec = WireSpec { id, depth, overload, filter, target, counts: counts.clone() };
-        let priorities = sender.priorities(from.1);
-        let (from_id, to_id) = ((sender.id, from.1), (receiver.id, to.1));
-        let (routes, lanes) = (self.routes_from(from_id), self.lanes_into(to_id));
-        let prepared = output.prepare(&spec, &priorities, routes, lanes).map_err(|NoSeat { seats }| {
-            Refusal::new(format!("{} has readers on all {seats} seats of its memory", plan.from))
-        })?;
-        let (sender_executor, receiver_executor, slot) = (sender.executor, receiver.executor, receiver.slot);
-        let joined = input.clone();
-        self.commit(receiver_executor, Change::Join { end: input, lanes: prepared.lanes, slot }, fabric)?;
-        let route = Change::Route { end: output, route: prepared.route };
-        self.commit(sender_executor, route, fabric).inspect_err(|_| {
-            // Nobody has sent anything: the receiver leaves again.
-            self.leave(receiver_executor, joined, id, true, fabric);
-        })?;
-        self.wires.push(Wire {
+        let wire = Wire {
             id,
-            from: from_id,
-            to: to_id,
+            ring: id,
+            from,
+            to,
             partner: None,
             is_answer,
             depth,
             overload,
             filter: plan.filter.clone(),
-            counts,
+            passes,
+            counts: Arc::new(WireCounts::default()),
+            past: WireTotals::default(),
+        };
+        let steps = self.connect(&wire)?;
+        staged.undo(move |router| {
+            router.unlist(id);
+            router.of_mut(to.0, |known| known.joined(to.1, -1));
+            router.of_mut(from.0, |known| known.routed(from.1, -1));
         });
-        if sender_executor == receiver_executor && wakes {
-            self.commit_order(sender_executor, fabric)?;
+        steps.into_iter().for_each(|step| staged.step(step));
+        let (sender, receiver) = (self.agents[&from.0].executor, self.agents[&to.0].executor);
+        if sender == receiver && wakes {
+            staged.reorder(sender);
         }
+        self.list(wire);
         Ok(id)
+    }
+
+    /// Prepares the rings of a wire, and counts them.
+    pub(super) fn connect(&mut self, wire: &Wire) -> Reply<[Step; 2]> {
+        let (sender, receiver) = (&self.agents[&wire.from.0], &self.agents[&wire.to.0]);
+        let ends = (sender.ends[wire.from.1].output.clone(), receiver.ends[wire.to.1].input.clone());
+        let (Some(output), Some(input)) = ends else {
+            let WirePlan { from, to, .. } = self.plan_of(wire);
+            return Err(Refusal::new(format!("{from} cannot be wired to {to}")));
+        };
+        let target = Target {
+            executor: receiver.executor as u32,
+            slot: receiver.slot,
+            door: self.executors[receiver.executor].link.door.clone(),
+            wakes: receiver.wakes(wire.to.1),
+        };
+        let (depth, overload, counts) = (wire.depth, wire.overload, wire.counts.clone());
+        let spec = WireSpec { id: wire.ring, depth, overload, filter: wire.passes, target, counts };
+        let (routes, lanes) = (sender.rings[wire.from.1].out, receiver.rings[wire.to.1].into);
+        let priorities = sender.priorities(wire.from.1);
+        let made = output.prepare(&spec, &priorities, routes, lanes * Priority::ALL.len());
+        let made = made.map_err(|NoSeat { seats }| {
+            let from = self.plan_of(wire).from;
+            Refusal::new(format!("{from} has readers on all {seats} seats of its memory"))
+        })?;
+        let step =
+            |executor, of, change| Step { executor, of, ring: Some(wire.ring), what: What::Change(change) };
+        let join = Change::Join { end: input, lanes: made.lanes, slot: receiver.slot };
+        let route = Change::Route { end: output, route: made.route, slot: sender.slot };
+        let steps = [step(receiver.executor, receiver.id, join), step(sender.executor, sender.id, route)];
+        self.of_mut(wire.to.0, |known| known.joined(wire.to.1, 1));
+        self.of_mut(wire.from.0, |known| known.routed(wire.from.1, 1));
+        Ok(steps)
+    }
+
+    pub(super) fn list(&mut self, wire: Wire) {
+        for id in [wire.from.0, wire.to.0] {
+            self.of_mut(id, |known| _ = known.wires.insert(wire.id));
+        }
+        self.wires.insert(wire.id, wire);
+    }
+
+    pub(super) fn unlist(&mut self, id: WireId) -> Option<Wire> {
+        let wire = self.wires.remove(&id)?;
+        for agent in [wire.from.0, wire.to.0] {
+            self.of_mut(agent, |known| _ = known.wires.remove(&id));
+        }
+        Some(wire)
     }
 
     pub(super) fn wire_id(&mut self) -> WireId {
@@ -169,25 +188,12 @@ impl Router {
         WireId(self.next_wire - 1)
     }
 
-    /// How many routes lead out of a port.
-    pub(super) fn routes_from(&self, port: (AgentId, usize)) -> usize {
-        self.wires.iter().filter(|wire| wire.from == port).count() + self.calls_of(port)
-    }
-
-    /// How many lanes lead into a port at most.
-    pub(super) fn lanes_into(&self, port: (AgentId, usize)) -> usize {
-        let wires = self.wires.iter().filter(|wire| wire.to == port).count();
-        (wires + self.calls_of(port)) * Priority::ALL.len()
-    }
-
-    pub(super) fn unwire(&mut self, from: &str, to: &str, fabric: &mut dyn Fabric) -> Reply<()> {
-        self.port(from)?;
-        self.port(to)?;
-        let Some(wire) = self.find_wire(from, to) else {
-            let ends = self.port(from)?;
-            let id = (self.agents[ends.0].id, ends.1);
+    pub(super) fn unwire(&mut self, from: &str, to: &str, staged: &mut Staged) -> Reply<()> {
+        let (out, into) = (self.port(from)?, self.port(to)?);
+        let Some(wire) = self.find_wire(out, into) else {
+            let wires = self.agents[&out.0].wires.iter().filter_map(|id| self.wires.get(id));
             let known: Vec<String> =
-                self.wires.iter().filter(|wire| wire.from == id).map(|w| self.plan_of(w).to).collect();
+                wires.filter(|wire| wire.from == out).map(|wire| self.plan_of(wire).to).collect();
             let refusal = Refusal::new(format!("{from} is not wired to {to}"));
             return Err(if known.is_empty() {
                 refusal
@@ -196,81 +202,42 @@ impl Router {
             });
         };
         let (id, partner) = (wire.id, wire.partner);
-        self.cut(id, false, fabric)?;
-        partner.map_or(Ok(()), |partner| self.cut(partner, false, fabric))
-    }
-
-    /// Cuts one ring wire: the sender forgets, then the receiver leaves, when it is drained unless that is not waited for.
-    pub(super) fn cut(&mut self, id: WireId, force: bool, fabric: &mut dyn Fabric) -> Reply<()> {
-        let Some(wire) = self.wires.iter().find(|wire| wire.id == id) else { return Ok(()) };
-        let (from, to) = (wire.from, wire.to);
-        let end =
-            |id: AgentId, port: usize| self.by_id(id).map(|known| (known.executor, known.ends[port].clone()));
-        if let Some((executor, PortEnds { output: Some(end), .. })) = end(from.0, from.1) {
-            let into = end.forgetting_box();
-            self.commit(executor, Change::Forget { end, wire: id, into }, fabric)?;
+        self.cut(id, true, staged);
+        if let Some(partner) = partner {
+            self.cut(partner, true, staged);
         }
-        let end =
-            |id: AgentId, port: usize| self.by_id(id).map(|known| (known.executor, known.ends[port].clone()));
-        if let Some((executor, PortEnds { input: Some(end), .. })) = end(to.0, to.1) {
-            self.leave(executor, end, id, force, fabric);
-        }
-        self.wires.retain(|wire| wire.id != id);
         Ok(())
     }
 
-    /// Takes the lanes of a wire out of a mailbox, when it is drained unless that is not waited for. An executor that does not answer does it
-    /// when it does: nobody sends on that wire any more.
-    pub(super) fn leave(
-        &mut self,
-        executor: usize,
-        end: Arc<dyn InputEnd>,
-        wire: WireId,
-        force: bool,
-        fabric: &mut dyn Fabric,
-    ) {
-        // A receiver that takes nothing any more is not waited for: what lies in its mailbox is lost with it.
-        const PATIENCE: usize = 100;
-        for attempt in 0..=PATIENCE {
-            let (into, force) = (end.leaving_box(), force || attempt == PATIENCE);
-            let change = Change::Leave { end: end.clone(), wire, into, force };
-            match self.commit_and_get(executor, change, fabric) {
-                Ok(Committed::Done) => return,
-                Ok(Committed::NotDrained) => {}
-                Err(_) => {
-                    self.owed.push(Owed { executor, wire, end: OwedEnd::Leave(end) });
-                    return;
-                }
-            }
+    /// Cuts one wire of rings: the sender forgets, then the receiver leaves; when it is drained, if that is waited for.
+    pub(super) fn cut(&mut self, id: WireId, drains: bool, staged: &mut Staged) {
+        let Some(wire) = self.unlist(id) else { return };
+        if let Some(step) = self.forget_step(&wire) {
+            staged.step(step);
         }
+        let until = if drains { self.now + DRAINS_WITHIN } else { self.now };
+        if let Some((executor, cut)) = self.cut_of(&wire, Tally::Wire(wire.id, wire.past), until) {
+            staged.cut(executor, cut);
+        }
+        staged.undo(move |router| router.list(wire));
     }
 
-    /// Takes the route of a wire out of an output. An executor that does not answer does it when it does.
-    pub(super) fn forget(
-        &mut self,
-        executor: usize,
-        end: Arc<dyn OutputEnd>,
-        wire: WireId,
-        fabric: &mut dyn Fabric,
-    ) {
-        let into = end.forgetting_box();
-        if self.commit_and_get(executor, Change::Forget { end: end.clone(), wire, into }, fabric).is_err() {
-            self.owed.push(Owed { executor, wire, end: OwedEnd::Forget(end) });
-        }
+    /// The sender of a wire forgets its present ring.
+    pub(super) fn forget_step(&self, wire: &Wire) -> Option<Step> {
+        let sender = self.by_id(wire.from.0)?;
+        let end = sender.ends[wire.from.1].output.clone()?;
+        let (into, slot) = (end.forgetting_box(), sender.slot);
+        let change = Change::Forget { end, wire: wire.ring, into, slot };
+        Some(Step { executor: sender.executor, of: sender.id, ring: None, what: What::Change(change) })
     }
 
-    /// An executor has answered: what it owes from the time when it did not is made up for.
-    pub(super) fn make_up(&mut self, executor: usize, fabric: &mut dyn Fabric) {
-        while let Some(at) = self.owed.iter().position(|owed| owed.executor == executor) {
-            let Owed { wire, end, .. } = self.owed.swap_remove(at);
-            let before = self.owed.len();
-            match end {
-                OwedEnd::Forget(end) => self.forget(executor, end, wire, fabric),
-                OwedEnd::Leave(end) => self.leave(executor, end, wire, true, fabric),
-            }
-            if self.owed.len() > before {
-                return;
-            }
-        }
+    /// The receiver of a wire leaves its present ring.
+    pub(super) fn cut_of(&self, wire: &Wire, into: Tally, until: Time) -> Option<(usize, Cut)> {
+        let receiver = self.by_id(wire.to.0)?;
+        let end = receiver.ends[wire.to.1].input.clone()?;
+        let Wire { from, to, ring, overload, .. } = *wire;
+        let counts = wire.counts.clone();
+        let cut = Cut { slot: receiver.slot, to, from, end, ring, counts, overload, into, until };
+        Some((receiver.executor, cut))
     }
 }
