@@ -50,6 +50,10 @@
 //! assert_eq!(report.view.agents[1].counts.releases, 101);
 //! ```
 
+// Derived code names the crate from outside.
+#[cfg(test)]
+extern crate self as runtime;
+
 mod agent;
 mod allocations;
 mod check;

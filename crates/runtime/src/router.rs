@@ -15,6 +15,8 @@ mod order;
 mod requests;
 mod script;
 mod staged;
+#[cfg(all(test, not(loom)))]
+mod tests;
 mod view;
 mod wires;
 

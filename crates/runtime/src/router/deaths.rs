@@ -73,8 +73,8 @@ impl Router {
         self.incidents.push(Incident { time: self.now, agent, what });
     }
 
-    /// An executor says that an agent died.
-    pub(super) fn died(&mut self, slot: u32, id: AgentId, time: Time, cause: RawCause) {
+    /// An executor says that an agent died. One that was lost is back when its body is: in simulated time.
+    pub(super) fn died(&mut self, slot: u32, id: AgentId, time: Time, cause: RawCause, is_back: bool) {
         let lost = matches!(cause, RawCause::Hang | RawCause::Stop);
         let cause = match cause {
             RawCause::Fault(fault) => Cause::Fault(fault),
@@ -88,11 +88,11 @@ impl Router {
         if self.by_id(id).is_some_and(|known| known.slot == slot) {
             self.bury(id, time, &cause);
             if lost {
-                self.renew(id);
+                self.renew(id, is_back);
             }
         } else if lost {
             // It was removed meanwhile, or that is where it is lost.
-            self.abandon(id, &[]);
+            self.abandon(id, &[], is_back);
             self.say_of(id, format!("{cause}; it was removed"));
         }
     }
@@ -122,12 +122,12 @@ impl Router {
 
     /// Gives an agent that is lost in a step new ports under its old number. Its old ones may still be in use there: they are left to
     /// it, nobody listens to them any more, and nobody sends to them.
-    fn renew(&mut self, id: AgentId) {
+    fn renew(&mut self, id: AgentId, is_back: bool) {
         let Some(known) = self.by_id(id) else { return };
         let touching: Vec<Wire> =
             known.wires.iter().filter_map(|wire| self.wires.get(wire)).cloned().collect();
         let rings: Vec<WireId> = touching.iter().map(|wire| wire.ring).collect();
-        self.abandon(id, &rings);
+        self.abandon(id, &rings, is_back);
         self.end_calls_of(id, "does not return from its step");
         if let Err(refusal) = self.new_ports(id) {
             self.of_mut(id, |known| known.state = AgentState::Dead);
@@ -148,6 +148,10 @@ impl Router {
                 steps.extend(self.forget_step(&old));
             }
             if old.to.0 == id {
+                if is_back && old.from.0 != id {
+                    // Else it keeps its place in the memory of the sender.
+                    self.of_mut(old.from.0, |known| known.routed(old.from.1, -1));
+                }
                 wire.past += totals(&old.counts, old.overload);
             } else if let Some((executor, mut cut)) =
                 self.cut_of(&old, Tally::Wire(old.id, WireTotals::default()), self.now)

@@ -62,7 +62,7 @@ impl Router {
     }
 
     /// Checks a request and writes it into the registry. When it is refused, what was written is to be taken back.
-    fn stage(&mut self, request: Request, staged: &mut Staged) -> Reply<()> {
+    pub(super) fn stage(&mut self, request: Request, staged: &mut Staged) -> Reply<()> {
         match request {
             Request::Add(plan) => self.add_wired(plan, staged),
             Request::Remove(agent) => self.remove(&agent, staged),

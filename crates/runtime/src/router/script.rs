@@ -172,7 +172,7 @@ impl Router {
     }
 
     /// Gives each script's next step, unless something that was decided sooner has yet to be given to that executor.
-    fn give(&mut self, fabric: &mut dyn Fabric) -> bool {
+    pub(super) fn give(&mut self, fabric: &mut dyn Fabric) -> bool {
         let mut moved = false;
         let mut behind = vec![false; if self.scripts.is_empty() { 0 } else { self.executors.len() }];
         for script in &mut self.scripts {
@@ -236,8 +236,7 @@ impl Router {
                     }
                     Answer::Lost(number, change) => self.lost(executor, number, change),
                     Answer::Died { slot, id, time, cause, body } => {
-                        drop(body);
-                        self.died(slot, id, time, cause);
+                        self.died(slot, id, time, cause, body.is_some());
                     }
                 }
             }
@@ -323,7 +322,7 @@ impl Router {
     }
 
     /// An agent will never come back from where it is: nobody touches its ends any more, and what it sends is not waited for.
-    pub(super) fn abandon(&mut self, id: AgentId, rings: &[WireId]) {
+    pub(super) fn abandon(&mut self, id: AgentId, rings: &[WireId], is_back: bool) {
         let mut cuts = Vec::new();
         for script in &mut self.scripts {
             for mut step in core::mem::take(&mut script.steps) {
@@ -349,7 +348,12 @@ impl Router {
                 at += 1;
             }
         }
-        cuts.iter().for_each(|cut| self.tally(cut));
+        for cut in cuts {
+            if is_back {
+                self.of_mut(cut.from.0, |known| known.routed(cut.from.1, -1));
+            }
+            self.tally(&cut);
+        }
     }
 
     /// What went over a ring that is no more. What was in it still is lost.
