@@ -4,6 +4,7 @@
 
 #[cfg(not(loom))]
 use core::sync::atomic::AtomicU32;
+use core::sync::atomic::{AtomicI32, Ordering};
 use std::io;
 
 /// Waits while `word` is `expected`, until it is woken or `until` (monotonic clock, nanoseconds) has come.
@@ -149,17 +150,34 @@ pub(crate) fn touch_stack() {
     }
 }
 
-/// Once at start: allows [`barrier_everywhere`].
-pub(crate) fn register_barrier() {
-    // SAFETY: the command takes no pointers.
-    unsafe { libc::syscall(libc::SYS_membarrier, libc::MEMBARRIER_CMD_REGISTER_PRIVATE_EXPEDITED, 0, 0) };
+/// The command that makes a barrier everywhere, once it is known which one this kernel has.
+static BARRIER: AtomicI32 = AtomicI32::new(libc::MEMBARRIER_CMD_PRIVATE_EXPEDITED);
+
+/// Asks a kernel for a barrier on every processor: the quick one, for which a process registers once, or the slow one, or none.
+fn find_barrier(ask: impl Fn(libc::c_int) -> io::Result<()>) -> io::Result<libc::c_int> {
+    let quick = ask(libc::MEMBARRIER_CMD_REGISTER_PRIVATE_EXPEDITED)
+        .and_then(|()| ask(libc::MEMBARRIER_CMD_PRIVATE_EXPEDITED));
+    match quick {
+        Ok(()) => Ok(libc::MEMBARRIER_CMD_PRIVATE_EXPEDITED),
+        Err(_) => ask(libc::MEMBARRIER_CMD_GLOBAL).map(|()| libc::MEMBARRIER_CMD_GLOBAL),
+    }
+}
+
+fn membarrier(command: libc::c_int) -> io::Result<()> {
+    // SAFETY: the commands take no pointers.
+    checked(unsafe { libc::syscall(libc::SYS_membarrier, command, 0, 0) } as libc::c_int)
+}
+
+/// Once at start: allows [`barrier_everywhere`]. Where it fails there is no such thing, and who needs it must do without.
+pub(crate) fn register_barrier() -> io::Result<()> {
+    find_barrier(membarrier).map(|command| BARRIER.store(command, Ordering::Relaxed))
 }
 
 /// A full memory barrier on every processor that runs a thread of this process.
 #[cfg(not(loom))]
 pub(crate) fn barrier_everywhere() {
-    // SAFETY: the command takes no pointers.
-    unsafe { libc::syscall(libc::SYS_membarrier, libc::MEMBARRIER_CMD_PRIVATE_EXPEDITED, 0, 0) };
+    // It was tried when it was registered, and does not fail later.
+    let _ = membarrier(BARRIER.load(Ordering::Relaxed));
 }
 
 /// The time stamp counter where there is one, else the monotonic clock: a reading for differences, cheap enough for every step.
@@ -208,4 +226,26 @@ pub(crate) fn nanos_per_tick() -> f64 {
         let (end, ended) = monotonic_and_ticks();
         (end - begin) as f64 / ended.saturating_sub(begun).max(1) as f64
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_kernel_is_asked_for_the_quick_barrier_then_for_the_slow_one_and_then_there_is_none() {
+        use libc::{MEMBARRIER_CMD_GLOBAL as SLOW, MEMBARRIER_CMD_PRIVATE_EXPEDITED as QUICK};
+        let denied = || io::Error::from_raw_os_error(libc::EPERM);
+        let kernel = |can: &'static [libc::c_int]| {
+            move |command| if can.contains(&command) { Ok(()) } else { Err(denied()) }
+        };
+        const REGISTER: libc::c_int = libc::MEMBARRIER_CMD_REGISTER_PRIVATE_EXPEDITED;
+        let found = |can| find_barrier(kernel(can)).ok();
+        assert_eq!(found(&[REGISTER, QUICK, SLOW]), Some(QUICK));
+        assert_eq!(found(&[REGISTER, SLOW]), Some(SLOW));
+        assert_eq!(found(&[QUICK, SLOW]), Some(SLOW), "without registering it is none");
+        assert_eq!(found(&[REGISTER]), None);
+        assert_eq!(found(&[]), None);
+        assert!(find_barrier(membarrier).is_ok(), "on the machine of the test");
+    }
 }

@@ -135,6 +135,8 @@ struct Runner {
     guards: Vec<std::thread::JoinHandle<()>>,
     over: Arc<AtomicBool>,
     hung: Arc<AtomicU32>,
+    /// Whether an executor can be taken from a thread that does not come back.
+    can_take: bool,
     spare_logs: SpareLogs,
     log: LogThread,
     asks: Receiver<Ask>,
@@ -160,7 +162,13 @@ impl Runner {
         let Live { built, control, asks, mut options, timed, clock } = live;
         drop(control);
         let Built { router, cores, directory } = built;
-        os::register_barrier();
+        let can_take = os::register_barrier();
+        if let Err(error) = &can_take {
+            let what = format!(
+                "no barrier on all processors: {error}; a step that does not return ends the run, for no other thread can go on safely"
+            );
+            router.log_shared.note(clock.now(), "sinew", &what);
+        }
         let wants_real_time =
             router.executors.iter().any(|executor| executor.plan.priority.is_some() && executor.is_used());
         if wants_real_time && let Err(error) = os::lock_memory() {
@@ -183,6 +191,7 @@ impl Runner {
             guards: Vec::new(),
             over: Arc::default(),
             hung: Arc::default(),
+            can_take: can_take.is_ok(),
             spare_logs: writers,
             log,
             asks,
@@ -200,8 +209,9 @@ impl Runner {
         for core in cores {
             runner.start_executor(core)?;
         }
+        runner.start_watchdog()?;
         if wants_real_time {
-            runner.start_guards()?;
+            runner.start_witnesses()?;
         }
         Ok(runner)
     }
@@ -250,13 +260,18 @@ impl Runner {
         Ok(())
     }
 
-    fn start_guards(&mut self) -> Result<(), CannotRun> {
+    fn start_watchdog(&mut self) -> Result<(), CannotRun> {
         let (cells, over, hung) = (self.cells.clone(), self.over.clone(), self.hung.clone());
+        let can_take = self.can_take;
         let watchdog = std::thread::Builder::new()
             .name("sinew-watchdog".into())
-            .spawn(move || watch(&cells, &over, &hung))
+            .spawn(move || watch(&cells, &over, &hung, can_take))
             .map_err(|error| CannotRun::NoThread(error.to_string()))?;
         self.guards.push(watchdog);
+        Ok(())
+    }
+
+    fn start_witnesses(&mut self) -> Result<(), CannotRun> {
         for cpu in 0..std::thread::available_parallelism().map_or(1, usize::from) {
             let (witness, over, offset) = (self.witness.clone(), self.over.clone(), self.clock.offset);
             let thread = std::thread::Builder::new()
@@ -331,7 +346,10 @@ impl Runner {
         }
         self.incidents_seen = self.router.incidents.len();
         if self.hung.load(Ordering::Relaxed) as usize > MOST_HUNG {
-            return Ok(Some(format!("more than {MOST_HUNG} steps did not return")));
+            return Ok(Some(match self.can_take {
+                true => format!("more than {MOST_HUNG} steps did not return"),
+                false => "a step did not return, and no other thread can go on safely".into(),
+            }));
         }
         if now >= *next_look {
             *next_look = now + self.options.observer.every().max(Duration::millis(1));
@@ -591,7 +609,7 @@ fn hang(cell: &Cell, number: u32, slot: u32) -> bool {
 }
 
 /// The watchdog: sees steps that last too long, gives their threads up, and hands what else they ran to the spare ones.
-fn watch(cells: &[Arc<Cell>], over: &AtomicBool, hung: &AtomicU32) {
+fn watch(cells: &[Arc<Cell>], over: &AtomicBool, hung: &AtomicU32, can_take: bool) {
     os::exact_timers();
     // Without the right to a priority it watches all the same, later.
     let _ = os::set_fifo(WATCHDOG_PRIORITY);
@@ -604,7 +622,12 @@ fn watch(cells: &[Arc<Cell>], over: &AtomicBool, hung: &AtomicU32) {
             let Some(step) = running.in_step() else { continue };
             let lasts =
                 os::ticks().saturating_sub(running.since.load(Ordering::Acquire)) as f64 * nanos_per_tick;
-            if lasts > running.limit.load(Ordering::Acquire) as f64 && take_over(cell, step) {
+            if lasts <= running.limit.load(Ordering::Acquire) as f64 {
+                continue;
+            }
+            if !can_take {
+                hung.store(MOST_HUNG as u32 + 1, Ordering::Relaxed);
+            } else if take_over(cell, step) {
                 hung.fetch_add(1, Ordering::Relaxed);
             }
         }
