@@ -3,6 +3,7 @@
 #![allow(clippy::unwrap_used)] // a test may
 
 mod calls;
+mod cuts;
 mod fire;
 mod memory;
 mod stuck;
@@ -332,6 +333,40 @@ fn a_filter_for_a_recipient_passes_what_is_for_it_or_for_everybody() {
     plan.wires[0].filter.recipient = Some("oen".into());
     let said = Simulation::new(&plan, &types(), options(80)).map(drop).unwrap_err().to_string();
     assert_eq!(said, "the plan has 1 mistakes, the first: there is no agent \"oen\"; did you mean \"one\"?");
+}
+
+#[test]
+fn who_was_given_up_comes_back_under_its_number_and_its_wires_go_on_counting() {
+    let mut plan = Plan::new("recipient-back");
+    plan.add::<Postman>("postman", Default::default());
+    plan.every("postman", Duration::millis(10));
+    for name in ["one", "two", "spy"] {
+        let test = if name == "two" { "recipient-back-two".into() } else { format!("recipient-back-{name}") };
+        plan.add::<Sink>(name, sink(&test));
+        plan.on(name, "count");
+        plan.agent_mut(name).unwrap().executor = Some(["reflex", "control", "vision"][name.len() % 3].into());
+    }
+    plan.agent_mut("one").unwrap().executor = Some("ordinary".into());
+    for (to, recipient) in [("one", "one"), ("spy", "one"), ("two", "two")] {
+        let mut wire = WirePlan::new("postman.out", format!("{to}.count"));
+        wire.filter.recipient = Some(recipient.into());
+        plan.wires.push(wire);
+    }
+    plan.requests = vec![at(105, "fault one hang")];
+    let report = Simulation::new(&plan, &types(), options(3000)).unwrap().run().unwrap();
+    let one = &report.view.agents[1];
+    assert_eq!((one.id, one.counts.hangs, one.counts.restarts), (AgentId(1), 1, 1), "{:?}", report.incidents);
+    let heard = |name: &str| -> Vec<f64> {
+        heard(&format!("recipient-back-{name}")).iter().map(|(_, twist)| twist.linear).collect()
+    };
+    let all: Vec<f64> = (1..=301).filter(|n| n % 3 != 2).map(f64::from).collect();
+    assert_eq!(heard("spy"), all, "whoever hears what is for it");
+    let (first, last) = (heard("one")[0], heard("one").last().copied());
+    assert_eq!((first, last), (all[0], all.last().copied()), "it hears again");
+    let wire = &report.view.wires[0];
+    assert_eq!(wire.sent + wire.refused, all.len() as u64, "{wire:?}");
+    assert_eq!(wire.sent, wire.taken + wire.dropped, "what lay in its mailbox is counted: {wire:?}");
+    assert_eq!(wire.taken, heard("one").len() as u64);
 }
 
 #[test]

@@ -1,13 +1,17 @@
 //! Who comes in the place of another.
 
+use core::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::any::Any;
 use std::sync::Mutex;
 
-use runtime::{Agent, Fault, Output, Params, Plan, Registry, Simulation, Step, registry};
+use runtime::{
+    Agent, Fault, Input, Live, Options, Output, Params, Plan, Registry, Request, Simulation, Step, WirePlan,
+    registry,
+};
 use types::Duration;
 use types::messages::Twist;
 
-use crate::{Sink, at, heard, options, sink};
+use crate::{Sink, Source, at, heard, options, sink};
 
 /// Which counters were stopped, by test and at which count.
 static STOPPED: Mutex<Vec<(String, i64)>> = Mutex::new(Vec::new());
@@ -135,4 +139,163 @@ fn a_panic_while_taking_over_is_a_death_like_any_other() {
     let counts = counts(test);
     assert_eq!(counts[..6], [1, 2, 3, 4, 5, 1], "it knows nothing of what was before");
     assert_eq!(stopped(test), [5], "who was replaced is stopped all the same");
+}
+
+/// Whether those who do not want to go may.
+static LET_GO: AtomicBool = AtomicBool::new(false);
+/// Whose stop or taking over has begun.
+static HOLDING: AtomicU64 = AtomicU64::new(0);
+
+/// Does not return from its stop, or from taking over, until it is let go.
+#[derive(Agent)]
+struct Clinging {
+    /// What comes.
+    count: Input<Twist>,
+    params: ClingingParams,
+}
+
+/// To what it clings.
+#[derive(Clone, Debug, Default, Params)]
+struct ClingingParams {
+    /// To its place, when another shall come.
+    stop: bool,
+    /// To that of the other.
+    take_over: bool,
+}
+
+impl Clinging {
+    fn cling() {
+        HOLDING.fetch_add(1, Ordering::AcqRel);
+        while !LET_GO.load(Ordering::Acquire) {
+            std::thread::yield_now();
+        }
+    }
+}
+
+impl Agent for Clinging {
+    fn step(&mut self, _: &mut Step) -> Result<(), Fault> {
+        while self.count.take().is_some() {}
+        Ok(())
+    }
+    fn take_over(&mut self, _: &mut dyn Any) {
+        if self.params.take_over {
+            Clinging::cling();
+        }
+    }
+    fn stop(&mut self, _: &mut Step) {
+        if self.params.stop {
+            Clinging::cling();
+        }
+    }
+}
+
+#[test]
+fn who_does_not_return_from_its_stop_or_from_taking_over_is_found_and_keeps_nobody_waiting() {
+    let types = registry![Source, Sink, Clinging];
+    let mut plan = Plan::new("clinging");
+    plan.add::<Source>("source", Default::default());
+    plan.every("source", Duration::millis(5));
+    for (name, stop) in [("goes", true), ("stays", false)] {
+        plan.add::<Clinging>(name, ClingingParams { stop, take_over: false });
+        plan.on(name, "count");
+        plan.wires.push(WirePlan::new("source.out", format!("{name}.count")));
+    }
+    plan.add::<Sink>("sink", sink("clinging"));
+    plan.on("sink", "count");
+    plan.wires.push(WirePlan::new("source.out", "sink.count"));
+    for agent in &mut plan.agents {
+        agent.executor = Some("control".into());
+    }
+    let live = Live::new(&plan, &types, Options { limit: None, ..options(0) }).unwrap();
+    let control = live.control();
+    let asker = std::thread::Builder::new().name("asker".into()).spawn(move || {
+        let wait = |what: &dyn Fn(&runtime::SystemView) -> bool| {
+            // Half a minute, in which something would be wrong.
+            for _ in 0..30_000 {
+                if what(&control.view().unwrap()) {
+                    return true;
+                }
+                std::thread::park_timeout(std::time::Duration::from_millis(1));
+            }
+            false
+        };
+        let of = |view: &runtime::SystemView, name: &str| {
+            view.agents.iter().find(|agent| agent.name == name).map(|agent| agent.counts)
+        };
+        let stepped = |view: &runtime::SystemView| {
+            of(view, "goes").is_none_or(|c| c.releases > 2)
+                && of(view, "stays").is_some_and(|c| c.releases > 2)
+        };
+        let ran = wait(&stepped);
+        let removed = control.request(Request::Remove("goes".into()));
+        let mut params = types::value::Table::default();
+        params.set("take_over", types::value::Value::from(true));
+        let (agent, kind) = ("stays".to_owned(), "clinging".to_owned());
+        let replaced = control.request(Request::Replace { agent, kind, params });
+        let back = wait(&|view| of(view, "stays").is_some_and(|counts| counts.restarts == 1));
+        let before = heard("clinging").len();
+        let goes_on = wait(&|_| heard("clinging").len() > before + 20);
+        LET_GO.store(true, Ordering::Release);
+        control.request(Request::Quit).unwrap();
+        (ran, removed, replaced, back, goes_on)
+    });
+    let report = live.run().unwrap();
+    let (ran, removed, replaced, back, goes_on) = asker.unwrap().join().unwrap();
+    assert!(ran && back && goes_on, "{ran} {back} {goes_on} {:?}", report.incidents);
+    assert_eq!((removed, replaced), (Ok(()), Ok(())));
+    assert_eq!(HOLDING.load(Ordering::Acquire), 2);
+    let said: Vec<String> =
+        report.incidents.iter().map(|incident| format!("{}: {}", incident.agent, incident.what)).collect();
+    let hung = "it did not return from its stop, or from taking over";
+    assert_eq!(
+        said,
+        [format!("goes: {hung}; it was removed"), format!("stays: {hung}"), "stays: started again".into()]
+    );
+    let numbers: Vec<i64> = heard("clinging").iter().map(|(_, twist)| twist.linear as i64).collect();
+    assert_eq!(numbers, (1..=numbers.len() as i64).collect::<Vec<_>>(), "the bystander misses nothing");
+    let names: Vec<&str> = report.view.agents.iter().map(|agent| agent.name.as_str()).collect();
+    assert_eq!(names, ["source", "stays", "sink"]);
+}
+
+/// Takes memory where it may: when it starts, takes over and stops.
+#[derive(Agent)]
+struct Hoarder {
+    /// Nothing.
+    out: Output<Twist>,
+    kept: Vec<Vec<u8>>,
+}
+
+impl Agent for Hoarder {
+    fn start(&mut self, _: &mut Step) -> Result<(), Fault> {
+        self.kept.push(vec![1; 100]);
+        Ok(())
+    }
+    fn step(&mut self, _: &mut Step) -> Result<(), Fault> {
+        Ok(())
+    }
+    fn take_over(&mut self, before: &mut dyn Any) {
+        if let Some(before) = before.downcast_mut::<Hoarder>() {
+            self.kept = before.kept.clone();
+        }
+    }
+    fn stop(&mut self, _: &mut Step) {
+        self.kept.clear();
+    }
+}
+
+#[test]
+fn what_an_agent_takes_once_in_its_life_is_nobodys_fault() {
+    let mut plan = Plan::new("hoarder");
+    plan.add::<Hoarder>("hoarder", Default::default());
+    plan.every("hoarder", Duration::millis(10));
+    plan.agent_mut("hoarder").unwrap().executor = Some("reflex".into());
+    plan.requests =
+        vec![at(45, "replace hoarder hoarder"), at(65, "restart hoarder"), at(85, "remove hoarder")];
+    // Somebody without whom the run would end.
+    plan.add::<Source>("source", Default::default());
+    plan.every("source", Duration::millis(10));
+    let report = Simulation::new(&plan, &registry![Hoarder, Source], options(100)).unwrap().run().unwrap();
+    assert!(report.incidents.iter().all(|incident| !incident.what.contains("refused")), "{report:#?}");
+    let took: u64 = report.view.executors.iter().map(|executor| executor.allocations).sum();
+    assert_eq!(took, 0, "{:?}", report.view.executors);
 }

@@ -1,0 +1,55 @@
+//! What is on a wire when it is cut.
+
+use runtime::{Options, Overload, Plan, Report, Simulation, WirePlan, WireTotals};
+use types::Duration;
+
+use crate::{Sink, Source, SourceParams, at, heard, options, sink, types};
+
+/// A source every 10 ms and a sink that looks every second, with room for all that comes meanwhile.
+fn run(test: &str, requests: &[(i64, &str)], millis: i64) -> (Vec<i64>, Report) {
+    let mut plan = Plan::new(test);
+    plan.add::<Source>("source", SourceParams::default());
+    plan.add::<Sink>("sink", sink(test));
+    let mut wire = WirePlan::new("source.out", "sink.count");
+    (wire.depth, wire.overload) = (Some(128), Some(Overload::Refuse));
+    plan.wires.push(wire);
+    plan.every("source", Duration::millis(10));
+    plan.every("sink", Duration::secs(1));
+    plan.requests = requests.iter().map(|(millis, words)| at(*millis, words)).collect();
+    let report = Simulation::new(&plan, &types(), Options { ..options(millis) }).unwrap().run().unwrap();
+    let heard = heard(test).iter().map(|(_, twist)| twist.linear as i64).collect();
+    (heard, report)
+}
+
+#[test]
+fn a_receiver_takes_what_was_sent_before_the_wire_was_cut_however_long_that_takes_it() {
+    for (test, request) in [("cut-unwired", "unwire source.out sink.count"), ("cut-sender", "remove source")]
+    {
+        let (heard, report) = run(test, &[(505, request)], 3000);
+        assert_eq!(heard, (1..=51).collect::<Vec<_>>(), "{request}");
+        let all = WireTotals { sent: 51, taken: 51, ..WireTotals::default() };
+        assert_eq!((report.view.wires.len(), report.view.past), (0, all), "{request}");
+    }
+}
+
+#[test]
+fn a_wire_that_is_made_again_brings_what_comes_after_what_came_before() {
+    let again = [(505, "unwire source.out sink.count"), (605, "wire source.out sink.count")];
+    let (heard, _) = run("cut-again", &again, 1005);
+    // The new wire is an ordinary one: it keeps the newest four of the forty that come until the sink looks.
+    assert_eq!(heard, (1..=51).chain(98..=101).collect::<Vec<_>>());
+}
+
+#[test]
+fn what_nobody_took_is_counted_as_dropped() {
+    // It does nothing any more: five seconds after the cut it is not waited for.
+    let off = [(5, "fault sink off"), (505, "unwire source.out sink.count")];
+    let (heard, before) = run("cut-off-soon", &off, 5500);
+    assert_eq!((heard.len(), before.view.past), (1, WireTotals::default()));
+    let (_, after) = run("cut-off-late", &off, 5600);
+    let lost = WireTotals { sent: 51, taken: 1, dropped: 50, ..WireTotals::default() };
+    assert_eq!(after.view.past, lost);
+
+    let (heard, removed) = run("cut-removed", &[(505, "remove sink")], 600);
+    assert_eq!((heard.len(), removed.view.past), (1, lost), "a mailbox goes with its agent");
+}
