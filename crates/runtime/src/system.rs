@@ -1,5 +1,6 @@
 //! A running plan.
 
+use std::collections::HashMap;
 use std::sync::Arc;
 use std::sync::mpsc::{Receiver, SyncSender, sync_channel};
 
@@ -241,15 +242,17 @@ pub(crate) fn build(plan: &Plan, registry: &Registry, log: LogChoice, now: Time)
     let wires = wires_of(plan, registry);
     let mut fabric = Still { cores: &mut cores, context: &context, now };
     let mut staged = Staged::default();
+    let mut readers_of: HashMap<&str, usize> = HashMap::new();
+    for wire in &wires {
+        *readers_of.entry(&wire.from).or_default() += 1;
+    }
     for agent in &plan.agents {
         let Some(kind) = registry.get(&agent.kind) else { continue };
-        let readers: Vec<usize> = kind
-            .ports
-            .iter()
-            .map(|port| {
-                wires.iter().filter(|wire| wire.from == format!("{}.{}", agent.name, port.name)).count()
-            })
-            .collect();
+        let readers = kind.ports.iter().map(|port| {
+            let name = format!("{}.{}", agent.name, port.name);
+            readers_of.get(name.as_str()).copied().unwrap_or(0)
+        });
+        let readers: Vec<usize> = readers.collect();
         router.add(agent.clone(), &readers, &mut staged).map_err(CannotRun::Refused)?;
     }
     for wire in &wires {

@@ -8,6 +8,7 @@ mod fire;
 mod memory;
 mod stuck;
 mod successor;
+mod thousand;
 mod wall;
 
 use runtime::{

@@ -1,0 +1,83 @@
+//! A system of a thousand agents in which one comes, is wired and goes, again and again. What it costs is printed, never asserted.
+
+use std::time::Instant;
+
+use runtime::{AgentPlan, Control, Live, Options, Plan, Request, Simulation, WirePlan, registry};
+use types::Duration;
+
+use crate::{Relay, Source, options};
+
+const AGENTS: usize = 1000;
+const ROUNDS: usize = 300;
+
+/// A source and relays in rows of ten, on two executors.
+fn plan() -> Plan {
+    let mut plan = Plan::new("thousand");
+    plan.add::<Source>("source", Default::default());
+    plan.every("source", Duration::secs(1));
+    for i in 0..AGENTS - 1 {
+        let name = format!("relay{i}");
+        plan.add::<Relay>(&name, Default::default());
+        plan.on(&name, "from");
+        plan.agent_mut(&name).unwrap().executor = Some(["reflex", "control"][i / 500].into());
+        let from = if i % 10 == 0 { "source.out".into() } else { format!("relay{}.to", i - 1) };
+        plan.wires.push(WirePlan::new(from, format!("{name}.from")));
+    }
+    plan
+}
+
+/// Adds one, wires it, cuts that again and removes it: the median of each (µs).
+fn rounds(control: &Control) -> [f64; 4] {
+    let mut took = [(); 4].map(|()| Vec::new());
+    for round in 0..ROUNDS {
+        let guest = format!("guest{round}");
+        let mut plan = AgentPlan { name: guest.clone(), kind: "relay".into(), ..AgentPlan::default() };
+        (plan.executor, plan.on) = (Some("reflex".into()), vec!["from".into()]);
+        let (from, to) = ("relay42.to".to_owned(), format!("{guest}.from"));
+        let requests = [
+            Request::Add(plan),
+            Request::Wire(WirePlan::new(&from, &to)),
+            Request::Unwire { from, to },
+            Request::Remove(guest),
+        ];
+        for (took, request) in took.iter_mut().zip(requests) {
+            let begun = Instant::now();
+            control.request(request).unwrap();
+            took.push(begun.elapsed().as_secs_f64() * 1e6);
+        }
+    }
+    took.map(|mut took| {
+        took.sort_by(f64::total_cmp);
+        took[took.len() / 2]
+    })
+}
+
+/// Measures beside a run, which then ends.
+fn beside(control: Control) -> std::thread::JoinHandle<([f64; 4], usize, usize)> {
+    let work = move || {
+        let took = rounds(&control);
+        let view = control.view().unwrap();
+        control.request(Request::Quit).unwrap();
+        (took, view.agents.len(), view.wires.len())
+    };
+    std::thread::Builder::new().name("asker".into()).spawn(work).unwrap()
+}
+
+#[test]
+fn one_of_a_thousand_comes_and_goes() {
+    let types = registry![Source, Relay];
+    let built = Instant::now();
+    let simulation =
+        Simulation::new(&plan(), &types, Options { limit: None, speed: Some(1.0), ..options(0) }).unwrap();
+    println!("{AGENTS} agents are built in {:.1} ms", built.elapsed().as_secs_f64() * 1e3);
+    let asker = beside(simulation.control());
+    simulation.run().unwrap();
+    let live = Live::new(&plan(), &types, Options { limit: None, ..options(0) }).unwrap();
+    let (simulated, live_asker) = (asker.join().unwrap(), beside(live.control()));
+    live.run().unwrap();
+    for (clock, (took, agents, wires)) in [("simulated", simulated), ("wall", live_asker.join().unwrap())] {
+        let [add, wire, unwire, remove] = took;
+        println!("{clock} (µs): add {add:.0}, wire {wire:.0}, unwire {unwire:.0}, remove {remove:.0}");
+        assert_eq!((agents, wires), (AGENTS, AGENTS - 1));
+    }
+}
