@@ -4,6 +4,7 @@
 
 mod calls;
 mod cuts;
+mod deaths;
 mod fire;
 mod memory;
 mod stuck;
