@@ -15,7 +15,8 @@
 
 use crate::sync::{AtomicU32, AtomicU64, Ordering, heavy_barrier, named};
 
-/// What the watchdog sees of an executor: which agent is in a step, and since when.
+/// What the watchdog sees of an executor: which agent is in a step, and since when. Each thread that has the executor in turn has one of
+/// its own: one that comes back when it has lost it says so in its own, and hides nobody's step.
 #[derive(Debug, Default)]
 pub(crate) struct Running {
     /// How many steps there were, and in the lower half the slot of the agent that is in one, plus one; zero there between steps.
@@ -27,7 +28,7 @@ pub(crate) struct Running {
     /// After how long it is taken for one that does not return (ns).
     pub limit: AtomicU64,
     /// How often the executor itself took or freed memory, between and around the steps of its agents.
-    pub allocations: core::sync::atomic::AtomicU64,
+    pub allocations: std::sync::Arc<core::sync::atomic::AtomicU64>,
 }
 
 /// A step of an agent: no other one is equal.
@@ -42,6 +43,11 @@ impl InStep {
 }
 
 impl Running {
+    /// Another one of the same executor, for the next thread that has it.
+    pub(crate) fn beside(&self) -> Running {
+        Running { allocations: self.allocations.clone(), ..Running::default() }
+    }
+
     /// A step begins. Only the thread that has the core may say so.
     #[inline]
     pub(crate) fn begin(&self, slot: u32) {

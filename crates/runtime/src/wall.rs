@@ -6,7 +6,7 @@
 
 #![allow(unsafe_code)]
 
-use core::sync::atomic::{AtomicBool, AtomicI32, AtomicU32, Ordering};
+use core::sync::atomic::{AtomicBool, AtomicI32, AtomicU32, AtomicUsize, Ordering};
 use std::cell::UnsafeCell;
 use std::sync::mpsc::{Receiver, RecvTimeoutError};
 use std::sync::{Arc, Mutex, PoisonError};
@@ -75,7 +75,9 @@ struct Cell {
     thread: AtomicI32,
     /// The slot that was given up, for the thread that takes over.
     given_up: AtomicU32,
-    running: Arc<Running>,
+    /// What each thread that has the core in turn publishes, and which of them has it.
+    running: Vec<Arc<Running>>,
+    current: AtomicUsize,
     door: Arc<Door>,
     /// Where the spare thread waits to be called; it takes the call back when it has the core.
     call: Futex,
@@ -83,6 +85,13 @@ struct Cell {
     needs_spare: AtomicBool,
     granted: Mutex<Option<String>>,
     stop: AtomicBool,
+}
+
+impl Cell {
+    fn running(&self) -> &Running {
+        // Pairs with the release of the thread that took over, which changes it before anybody can lose the core again.
+        &self.running[self.current.load(Ordering::Acquire) % self.running.len()]
+    }
 }
 
 // SAFETY: the core is touched only by the thread whose number `owner` holds.
@@ -227,7 +236,10 @@ impl Runner {
             owner: Owner::new(self.next_thread),
             thread: AtomicI32::new(0),
             given_up: AtomicU32::new(0),
-            running: core.running.clone(),
+            running: core::iter::once(core.running.clone())
+                .chain((0..SPARE_LOGS).map(|_| Arc::new(core.running.beside())))
+                .collect(),
+            current: AtomicUsize::new(0),
             door: core.door.clone(),
             call: Futex::new(NOBODY),
             needs_spare: AtomicBool::new(false),
@@ -490,6 +502,10 @@ fn thread_main(
         }
         if cell.call.word.load(Ordering::Acquire) == CALLED && cell.owner.claim(number) {
             let given_up = cell.given_up.load(Ordering::Acquire);
+            let current = cell.current.load(Ordering::Relaxed) + 1;
+            // SAFETY: the claim made the core this thread's own.
+            unsafe { (*cell.core.get()).running = cell.running[current % cell.running.len()].clone() };
+            cell.current.store(current, Ordering::Release);
             cell.call.word.store(NOBODY, Ordering::Release);
             cell.needs_spare.store(true, Ordering::Release);
             // SAFETY: the claim made the core this thread's own.
@@ -596,11 +612,11 @@ fn run_core(
 /// On request, an agent that does not return: the thread keeps its processor until the watchdog has given it up. Says whether
 /// the core is still this thread's.
 fn hang(cell: &Cell, number: u32, slot: u32) -> bool {
-    cell.running.since.store(os::ticks(), Ordering::Relaxed);
-    cell.running.begin(slot);
+    cell.running().since.store(os::ticks(), Ordering::Relaxed);
+    cell.running().begin(slot);
     while cell.owner.is_still(number) {
         if cell.stop.load(Ordering::Acquire) {
-            cell.running.end();
+            cell.running().end();
             return cell.owner.keeps(number);
         }
         core::hint::spin_loop();
@@ -618,7 +634,7 @@ fn watch(cells: &[Arc<Cell>], over: &AtomicBool, hung: &AtomicU32, can_take: boo
     while !over.load(Ordering::Acquire) {
         word.wait(0, Some(os::monotonic() + WATCHDOG_PERIOD.0));
         for cell in cells {
-            let running = &cell.running;
+            let running = cell.running();
             let Some(step) = running.in_step() else { continue };
             let lasts =
                 os::ticks().saturating_sub(running.since.load(Ordering::Acquire)) as f64 * nanos_per_tick;
@@ -638,7 +654,7 @@ fn watch(cells: &[Arc<Cell>], over: &AtomicBool, hung: &AtomicU32, can_take: boo
 fn take_over(cell: &Cell, step: InStep) -> bool {
     let no_spare =
         cell.call.word.load(Ordering::Acquire) != NOBODY || cell.needs_spare.load(Ordering::Acquire);
-    if no_spare || !cell.owner.take_from(&cell.running, step) {
+    if no_spare || !cell.owner.take_from(cell.running(), step) {
         return false;
     }
     // A failure leaves the thread where it is, at its priority; there is nothing else to be done about it.

@@ -103,3 +103,98 @@ fn what_an_executor_does_not_answer_to_is_refused_whole_and_never_done_later() {
     assert_eq!(view.agents.len(), 5);
     assert!(TAKEN.load(Ordering::Relaxed) > 3, "what was refused was done later");
 }
+
+/// Whether the one that lasts too long may return, and whether it is gone after it did.
+static RETURN: AtomicBool = AtomicBool::new(false);
+static GONE: AtomicBool = AtomicBool::new(false);
+/// Whether the other is in its step, and whether it may leave it in the end.
+static OTHER_IN_STEP: AtomicBool = AtomicBool::new(false);
+static OTHER_RETURN: AtomicBool = AtomicBool::new(false);
+
+/// Lasts too long, and returns when nobody reckons with it any more.
+#[derive(Agent)]
+struct Late {
+    /// Nothing.
+    out: Output<Twist>,
+    lasted: bool,
+}
+
+impl Agent for Late {
+    fn step(&mut self, _: &mut Step) -> Result<(), Fault> {
+        while !RETURN.load(Ordering::Acquire) {
+            self.lasted = true;
+            std::thread::yield_now();
+        }
+        Ok(())
+    }
+}
+
+impl Drop for Late {
+    fn drop(&mut self) {
+        // Instances that were only made ahead go, too.
+        if self.lasted {
+            GONE.store(true, Ordering::Release);
+        }
+    }
+}
+
+/// Begins its step when the other is lost, and does not return from it either.
+#[derive(Agent)]
+struct Then {
+    /// Nothing.
+    out: Output<Twist>,
+    steps: u64,
+}
+
+impl Agent for Then {
+    fn step(&mut self, step: &mut Step) -> Result<(), Fault> {
+        if step.agent_named("late").is_some() && !OTHER_IN_STEP.swap(true, Ordering::AcqRel) {
+            while !OTHER_RETURN.load(Ordering::Acquire) {
+                std::thread::yield_now();
+            }
+        }
+        self.steps += 1;
+        Ok(())
+    }
+}
+
+#[test]
+fn a_step_that_returns_after_it_was_given_up_does_not_hide_the_step_of_another() {
+    let types = registry![Late, Then];
+    let mut plan = runtime::Plan::new("hidden");
+    plan.add::<Late>("late", Default::default());
+    plan.add::<Then>("then", Default::default());
+    for (name, hang_after) in [("late", 100), ("then", 500)] {
+        plan.every(name, Duration::millis(10));
+        let agent = plan.agent_mut(name).unwrap();
+        (agent.executor, agent.hang_after) = (Some("control".into()), Some(Duration::millis(hang_after)));
+    }
+    let live = Live::new(&plan, &types, Options { limit: None, ..options(0) }).unwrap();
+    let control = live.control();
+    let asker = std::thread::Builder::new().name("asker".into()).spawn(move || {
+        // Half a minute in which something would be wrong.
+        let wait = |what: &dyn Fn() -> bool| {
+            (0..30_000).any(|_| {
+                std::thread::park_timeout(std::time::Duration::from_millis(1));
+                what()
+            })
+        };
+        let began = wait(&|| OTHER_IN_STEP.load(Ordering::Acquire));
+        RETURN.store(true, Ordering::Release);
+        let gone = wait(&|| GONE.load(Ordering::Acquire));
+        let hangs = |name: &str| {
+            let view = control.view().unwrap();
+            view.agents.iter().find(|agent| agent.name == name).unwrap().counts.hangs
+        };
+        let found = wait(&|| hangs("then") == 1);
+        let counted = hangs("late");
+        OTHER_RETURN.store(true, Ordering::Release);
+        control.request(Request::Quit).unwrap();
+        (began, gone, found, counted)
+    });
+    let report = live.run().unwrap();
+    let (began, gone, found, counted) = asker.unwrap().join().unwrap();
+    assert!(began && gone, "{began} {gone}");
+    assert!(found, "nobody saw that it does not return: {:?}", report.incidents);
+    assert_eq!(counted, 1);
+}
