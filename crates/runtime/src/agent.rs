@@ -50,8 +50,9 @@ pub trait Agent: Send + 'static {
     fn step(&mut self, step: &mut Step) -> Result<(), Fault>;
 
     /// Takes over what the agent in whose place it comes has learnt: called once, before `start`, when it replaces one that is alive. Who
-    /// that was, it sees by `downcast_mut`; what is moved out of it is kept, the rest is stopped and freed. Like a step it may not allocate
-    /// in a real-time executor: exchange buffers, do not copy them.
+    /// that was, it sees by `downcast_mut`; what is moved out of it is kept, the rest is stopped and freed. Like a start or a stop it may
+    /// take memory, which is not counted; but like a step it keeps the other agents of its executor waiting, and is given up when it lasts
+    /// too long: exchange buffers, do not copy them.
     ///
     /// ```
     /// # use runtime::{Agent, Fault, Output, Step};

@@ -52,12 +52,16 @@ impl Agent for Both {
 struct Serves<'a> {
     still: Still<'a>,
     left: usize,
+    /// Only this one, if only one does.
+    only: Option<usize>,
     waits: usize,
 }
 
 impl Fabric for Serves<'_> {
     fn ring(&mut self, executor: usize) {
-        if let Some(left) = self.left.checked_sub(1) {
+        if self.only.is_none_or(|only| only == executor)
+            && let Some(left) = self.left.checked_sub(1)
+        {
             self.left = left;
             self.still.ring(executor);
         }
@@ -106,7 +110,7 @@ impl World {
     fn with<R>(&mut self, serves: usize, work: impl FnOnce(&mut Router, &mut Serves<'_>, Time) -> R) -> R {
         let _entered = self.context.enter();
         let still = Still { cores: &mut self.cores, context: &self.context, now: self.now };
-        work(&mut self.router, &mut Serves { still, left: serves, waits: 0 }, self.now)
+        work(&mut self.router, &mut Serves { still, left: serves, only: None, waits: 0 }, self.now)
     }
 
     fn ask(&mut self, request: Request) -> Result<(), Refusal> {
@@ -175,7 +179,23 @@ impl World {
                 said.push(format!("{port} {} {:?} {}", wire.to.0.0, wire.to.1, after - before));
             }
         }
+        let ends = names.iter().map(|name| (name.clone(), self.ends(name)));
+        for (name, ends) in ends.collect::<Vec<_>>() {
+            let routes = [&ends[1], &ends[2]].map(|end| self.routes(end));
+            said.push(format!("{name} has {routes:?} routes"));
+        }
         said
+    }
+
+    /// How many rings lead out of an output, whether the registry knows them or not.
+    fn routes(&self, end: &PortEnds) -> u32 {
+        let mut out = Output::<Twist>::default();
+        out.bind(end);
+        let _entered = self.context.enter();
+        self.context.begin(AgentId::NONE, self.now, u32::MAX);
+        let sent = out.send(Twist::ZERO);
+        self.context.end();
+        sent.taken + sent.refused
     }
 
     fn sent(&self) -> Vec<u64> {
@@ -288,8 +308,10 @@ fn nobody_touches_the_ends_of_an_agent_that_is_lost() {
             (world.registry(), world.executors())
         };
         let mut world = World::new();
-        let (_, executor, slot) = world.slot("b");
+        let (id, executor, slot) = world.slot("b");
         let old = world.ends("b");
+        let cdr = [0, 1, 0, 0].into_iter().chain([0; 48]).collect();
+        world.ask(Request::Send { port: "b.go".into(), cdr }).unwrap();
         // It is decided, and before any executor comes to it, the agent is lost in a step.
         let mut staged = Staged::default();
         world.router.stage(request.clone(), &mut staged).unwrap();
@@ -316,6 +338,12 @@ fn nobody_touches_the_ends_of_an_agent_that_is_lost() {
                 Arc::ptr_eq(a.input.as_ref().unwrap(), b.input.as_ref().unwrap())
             };
             assert!(!same(&known.ends[0], &old[0]), "{request:?}: it has new ones");
+            let sent = known.ends[1].output.as_ref().unwrap().sent();
+            assert_eq!(
+                (known.id, sent),
+                (id, 1),
+                "{request:?}: its number, and those of its messages, go on"
+            );
         }
         // What was asked for is so, with the new ends.
         let restarted = world.now + Duration::secs(1);
@@ -323,6 +351,26 @@ fn nobody_touches_the_ends_of_an_agent_that_is_lost() {
         world.settle();
         assert_eq!(world.registry(), whole.0, "{request:?}");
         assert_eq!(world.executors(), whole.1, "{request:?}");
+    }
+}
+
+#[test]
+fn what_was_decided_first_is_done_first_whoever_answers_first() {
+    let before = (World::new().registry(), World::new().executors());
+    for first in ["a", "c"] {
+        let mut world = World::new();
+        let (_, executor, _) = world.slot(first);
+        for request in [wire("c.go", "a.come"), unwire("c.go", "a.come")] {
+            let mut staged = Staged::default();
+            world.router.stage(request, &mut staged).unwrap();
+            world.router.decide(staged);
+        }
+        world.with(usize::MAX, |router, fabric, _| {
+            fabric.only = Some(executor);
+            router.advance(fabric);
+        });
+        world.settle();
+        assert_eq!((world.registry(), world.executors()), before, "{first} answers first");
     }
 }
 
