@@ -6,9 +6,13 @@ mod caterpillar;
 mod hop;
 mod log;
 mod logged;
+mod part;
 mod tasks;
 
-pub(crate) use caterpillar::{FIGURES as CATERPILLAR_FIGURES, measure as caterpillar};
+pub(crate) use caterpillar::{
+    FIGURES as CATERPILLAR_FIGURES, PACED_FIGURES as CATERPILLAR_PACED_FIGURES, measure as caterpillar,
+    paced as caterpillar_paced,
+};
 pub(crate) use hop::{FIGURES as HOP_FIGURES, measure as hop};
 pub(crate) use logged::{FIGURES as LOGGED_FIGURES, measure as hop_logged};
 

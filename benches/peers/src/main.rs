@@ -34,7 +34,7 @@ use measurements::Measurement;
 use settings::Settings;
 
 const USAGE: &str = "\
-Usage: peers NAME [--iterations N] [--cpu A[,B]] [--period NS] [--fifo PRIORITY]
+Usage: peers NAME [--iterations N] [--cpu A[,B]] [--period NS] [--phase NS] [--fifo PRIORITY]
        peers list [--json]
 
 Prints one JSON document.
@@ -42,6 +42,7 @@ Prints one JSON document.
   --iterations N    how often; each measurement has its own default
   --cpu A[,B]       the processors of its first and second thread
   --period NS       the time between iterations (nanoseconds); hop is as fast as it can be without
+  --phase NS        the remainder of the times of iterations by the period, on the monotonic clock (nanosleep)
   --fifo PRIORITY   SCHED_FIFO for its threads; the document says what was granted";
 
 fn main() -> ExitCode {

@@ -37,6 +37,13 @@ pub(crate) const ALL: &[Measurement] = &[
         measure: copper::caterpillar,
     },
     Measurement {
+        name: "caterpillar_paced",
+        what: "the same at a pace, 10 000 iterations a second",
+        peer: copper::PEER,
+        figures: copper::CATERPILLAR_PACED_FIGURES,
+        measure: copper::caterpillar_paced,
+    },
+    Measurement {
         name: "rtrb",
         what: "push and pop of 64 bytes in one thread, to one receiver and to 64",
         peer: rings::PEER,

@@ -20,7 +20,7 @@ pub(crate) fn measure(settings: &Settings) -> Result<Document, String> {
     let period = settings.period.unwrap_or(PERIOD);
     let iterations = settings.iterations_or(ITERATIONS);
     let mut late = room(iterations);
-    let begun = now() + period;
+    let begun = settings.first(now(), period);
     for round in 0..iterations {
         let release = begun + round * period;
         sleep_until(release);

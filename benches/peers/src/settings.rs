@@ -11,6 +11,8 @@ pub(crate) struct Settings {
     pub(crate) cpus: Vec<usize>,
     /// The time from one iteration to the next (ns).
     pub(crate) period: Option<u64>,
+    /// The remainder of the times of iterations by the period (ns, monotonic clock); without it the first is a period away.
+    pub(crate) phase: Option<u64>,
     /// The priority under SCHED_FIFO; without it threads are ordinary ones.
     pub(crate) fifo: Option<i32>,
 }
@@ -24,6 +26,7 @@ impl Settings {
             match name {
                 "--iterations" => settings.iterations = Some(number(name, value, 1..=100_000_000)?),
                 "--period" => settings.period = Some(number(name, value, 1_000..=10_000_000_000)?),
+                "--phase" => settings.phase = Some(number(name, value, 0..=10_000_000_000)?),
                 "--fifo" => settings.fifo = Some(number(name, value, 1..=99)? as i32),
                 "--cpu" => {
                     let cpus =
@@ -49,8 +52,13 @@ impl Settings {
         self.iterations.unwrap_or(usual)
     }
 
+    /// When the first iteration is due at a period (ns, monotonic clock), a period from now or more.
+    pub(crate) fn first(&self, now: u64, period: u64) -> u64 {
+        self.phase.map_or(now + period, |phase| (now / period + 2) * period + phase % period)
+    }
+
     pub(crate) fn to_json(&self) -> Value {
-        json!({"iterations": self.iterations, "cpus": self.cpus, "period_ns": self.period, "fifo": self.fifo})
+        json!({"iterations": self.iterations, "cpus": self.cpus, "period_ns": self.period, "phase_ns": self.phase, "fifo": self.fifo})
     }
 }
 
@@ -65,9 +73,15 @@ mod tests {
     use super::*;
 
     #[test]
+    fn the_first_iteration_keeps_the_phase() {
+        let at = |phase| Settings { phase, ..Settings::default() }.first(12_345, 1000);
+        assert_eq!((at(None), at(Some(700)), at(Some(10)), at(Some(1200))), (13_345, 14_700, 14_010, 14_200));
+    }
+
+    #[test]
     fn options_are_read_and_wrong_ones_are_refused() {
         let read = Settings::read(&["--cpu", "0,1", "--fifo", "80", "--iterations", "5"]).unwrap();
-        assert_eq!(read, Settings { iterations: Some(5), cpus: vec![0, 1], period: None, fifo: Some(80) });
+        assert_eq!(read, Settings { iterations: Some(5), cpus: vec![0, 1], fifo: Some(80), ..Settings::default() });
         for (words, expected) in [
             (&["--fifo", "100"][..], "from 1 to 99"),
             (&["--iterations"], "needs a value"),

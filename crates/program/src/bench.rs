@@ -1,19 +1,36 @@
-//! `sinew bench`: what a machine makes of the runtime and the simulator.
+//! `sinew bench`: what a machine makes of the runtime and the simulator, beside other systems that do the same work.
+//!
+//! | to find | look in |
+//! |---|---|
+//! | how often and how long, with which other system | [`Setting`] |
+//! | figures, ratios, how they are printed | [`outcome`] |
+//! | the machine, how near its processors are just now | [`machine`], [`spin`] |
+//! | other systems, and rounds in which ours and theirs take turns | [`peers`], [`turns`] |
+//! | what the agents of the measurements share | [`parcel`] |
 
 mod hop;
+mod load;
 mod machine;
+mod outcome;
+mod parcel;
 mod peers;
 mod simulation;
+mod spin;
+mod threads;
+mod turns;
 mod wake;
 
+use std::path::PathBuf;
 use std::process::ExitCode;
 
 use clap::Args;
 use runtime::Registry;
-use serde_json::{Value as Json, json};
+use serde_json::json;
 
 use crate::error::Failure;
 use crate::terminal;
+use outcome::{Measured, Outcome};
+use peers::Peers;
 
 /// What `sinew bench` can be told.
 #[derive(Args, Debug)]
@@ -21,171 +38,111 @@ pub(crate) struct BenchArgs {
     /// Which; "list" says what there is.
     #[arg(value_name = "NAME")]
     name: String,
+    /// A tenth of the rounds and samples: to see that it works, not to publish.
+    #[arg(long)]
+    quick: bool,
 }
 
-/// The measurements.
-const BENCHES: [(&str, &str); 3] = [
-    ("hop", "a message of 64 bytes from a source over three agents to a sink, on one executor"),
-    ("wake", "from sending to the step of an agent that slept, on the same and on another processor"),
-    ("sim", "how many times as fast as real time simulations run"),
+/// One measurement.
+struct Bench {
+    name: &'static str,
+    what: &'static str,
+    /// What is aimed at.
+    goal: &'static str,
+    measure: fn(&Setting<'_>) -> Result<Outcome, Failure>,
+}
+
+/// All of them.
+const BENCHES: &[Bench] = &[
+    Bench {
+        name: "hop",
+        what: "messages between agents of one executor, with and without a log, to one and to 64, small and large",
+        goal: "hop/copper 1, hop_logged/copper_logged 1, fanout64/rtrb 3, fanout64_ports/rtrb 1.3, picture/hop64 1.15, caterpillar/copper 0.5",
+        measure: hop::measure,
+    },
+    Bench {
+        name: "wake",
+        what: "from sending to the step of an agent that slept, and how late periodic steps begin, idle and under load",
+        goal: "wake_same/futex 1.15, wake_cross/futex 1.1, jitter_idle/bare and jitter_loaded/bare 1.15",
+        measure: wake::measure,
+    },
+    Bench {
+        name: "sim",
+        what: "how many times as fast as real time simulations run",
+        goal: "1000 robots with twelve sonars and a laser in one world: real time",
+        measure: simulation::measure,
+    },
 ];
 
-/// A measured quantity, unfiltered.
-pub(super) struct Measured {
-    name: String,
-    unit: &'static str,
-    values: Vec<f64>,
+/// How a measurement is to be done.
+pub(super) struct Setting<'a> {
+    /// The agents that the program knows.
+    registry: &'a Registry,
+    /// The program that measures other systems, where there is one.
+    peers: Option<Peers>,
+    /// The program that makes load: this one. Nobody, and nothing is measured under load.
+    program: Option<PathBuf>,
+    /// Of so many rounds or samples one is done.
+    shorter: usize,
 }
 
-/// Ours and theirs, from the same run.
-pub(super) struct Ratio {
-    name: &'static str,
-    ours: f64,
-    theirs: f64,
-    value: f64,
-}
-
-/// What a measurement gives.
-#[derive(Default)]
-pub(super) struct Outcome {
-    figures: Vec<Measured>,
-    ratios: Vec<Ratio>,
-    /// Ratios without their other system: it is not here, or nothing asks for it.
-    missing: Vec<&'static str>,
-    /// Ratios whose other system is here, but could not be measured; with what it said.
-    failed: Vec<(&'static str, Failure)>,
+impl Setting<'_> {
+    /// How many of `full` rounds or samples are done, at least `least`.
+    fn of(&self, full: usize, least: usize) -> usize {
+        (full / self.shorter).max(least)
+    }
 }
 
 /// Measures.
 pub(crate) fn bench(args: &BenchArgs, registry: &Registry, json: bool) -> Result<ExitCode, Failure> {
-    let outcome = match args.name.as_str() {
+    match args.name.as_str() {
         "list" => {
             list(json);
             return Ok(ExitCode::SUCCESS);
         }
-        "hop" => hop::measure()?,
-        "wake" => wake::measure()?,
-        "sim" => simulation::measure(registry)?,
-        other => {
-            return Err(Failure::unknown(
-                "bench",
-                other,
-                BENCHES.iter().map(|(name, _)| *name).chain(["list"]),
-            ));
+        load::NAME => {
+            load::make()?;
+            return Ok(ExitCode::SUCCESS);
         }
+        _ => {}
+    }
+    let Some(bench) = BENCHES.iter().find(|bench| bench.name == args.name) else {
+        let known = BENCHES.iter().map(|bench| bench.name).chain(["list", load::NAME]);
+        return Err(Failure::unknown("bench", &args.name, known));
     };
+    let setting = Setting {
+        registry,
+        peers: Peers::find(),
+        program: std::env::current_exe().ok(),
+        shorter: if args.quick { 10 } else { 1 },
+    };
+    let mut spins = spin::round_trips();
+    let mut outcome = (bench.measure)(&setting)?;
+    spins.extend(spin::round_trips());
+    if !spins.is_empty() {
+        outcome.figures.push(Measured::new("spin_round_trip", "ns", spins));
+    }
     if json {
-        terminal::say_json(&outcome.to_json(&args.name));
+        terminal::say_json(&outcome.to_json(bench.name));
     } else {
-        terminal::say(&outcome.to_text(&args.name));
+        terminal::say(&outcome.to_text(bench.name));
     }
-    for name in &outcome.missing {
-        terminal::tell(&format!("{name} is missing: the other system was not measured beside ours"));
-    }
-    if !outcome.missing.is_empty() && peers::Peers::find().is_none() {
+    outcome.tell_missing();
+    if !outcome.missing.is_empty() && setting.peers.is_none() {
         terminal::tell("`cargo xtask peers` builds the program that measures other systems");
     }
-    for (name, failure) in &outcome.failed {
-        let what: Vec<&str> = failure.problems.iter().map(|problem| problem.what.as_str()).collect();
-        terminal::tell(&format!("{name} is missing: {}", what.join("\n")));
-    }
-    Ok(if outcome.missing.is_empty() && outcome.failed.is_empty() {
-        ExitCode::SUCCESS
-    } else {
-        ExitCode::FAILURE
-    })
+    Ok(if outcome.is_whole() { ExitCode::SUCCESS } else { ExitCode::FAILURE })
 }
 
 fn list(json: bool) {
     if json {
-        let rows = BENCHES.map(|(name, what)| json!({"name": name, "what": what}));
-        terminal::say_json(&json!({"benches": rows}));
+        let row = |bench: &Bench| json!({"name": bench.name, "what": bench.what, "goal": bench.goal});
+        terminal::say_json(&json!({"benches": BENCHES.iter().map(row).collect::<Vec<_>>()}));
     } else {
-        terminal::say(&BENCHES.map(|(name, what)| format!("{name:<6} {what}")).join("\n"));
-    }
-}
-
-impl Measured {
-    pub(super) fn new(name: impl Into<String>, unit: &'static str, mut values: Vec<f64>) -> Measured {
-        values.sort_by(f64::total_cmp);
-        Measured { name: name.into(), unit, values }
-    }
-
-    /// The value that a share of all does not exceed.
-    pub(super) fn at(&self, share: f64) -> f64 {
-        let wanted = (share * self.values.len() as f64).ceil().max(1.0) as usize;
-        self.values.get(wanted - 1).or(self.values.last()).copied().unwrap_or(f64::NAN)
-    }
-
-    fn to_json(&self) -> Json {
-        json!({
-            "name": self.name,
-            "unit": self.unit,
-            "n": self.values.len(),
-            "min": self.values.first(),
-            "p50": self.at(0.5),
-            "p99": self.at(0.99),
-            "p999": self.at(0.999),
-            "max": self.values.last(),
-        })
-    }
-}
-
-/// The value in the middle.
-pub(super) fn median(mut values: Vec<f64>) -> f64 {
-    values.sort_by(f64::total_cmp);
-    values.get(values.len() / 2).copied().unwrap_or(f64::NAN)
-}
-
-impl Outcome {
-    /// Adds ours and theirs from rounds in which they took turns: the round whose ratio is in the middle.
-    pub(super) fn compare(&mut self, name: &'static str, mut rounds: Vec<(f64, f64)>) {
-        rounds.sort_by(|a, b| (a.0 / a.1).total_cmp(&(b.0 / b.1)));
-        if let Some(&(ours, theirs)) = rounds.get(rounds.len() / 2) {
-            self.ratios.push(Ratio { name, ours, theirs, value: ours / theirs });
-        }
-    }
-
-    fn to_json(&self, name: &str) -> Json {
-        let ratios = self.ratios.iter().map(|ratio| {
-            json!({"name": ratio.name, "ours": ratio.ours, "theirs": ratio.theirs, "value": ratio.value})
-        });
-        json!({
-            "bench": name,
-            "machine": machine::describe(),
-            "figures": self.figures.iter().map(Measured::to_json).collect::<Vec<_>>(),
-            "ratios": ratios.collect::<Vec<_>>(),
-        })
-    }
-
-    fn to_text(&self, name: &str) -> String {
-        let mut out = format!("{name} on {}\n", machine::line());
-        let mut rows = vec![["figure", "unit", "n", "min", "p50", "p99", "p999", "max"].map(str::to_owned)];
-        let number = |x: f64| if x.abs() >= 100.0 { format!("{x:.0}") } else { format!("{x:.2}") };
-        for figure in &self.figures {
-            let (min, max) = (figure.values.first().copied(), figure.values.last().copied());
-            rows.push([
-                figure.name.clone(),
-                figure.unit.to_owned(),
-                figure.values.len().to_string(),
-                number(min.unwrap_or(f64::NAN)),
-                number(figure.at(0.5)),
-                number(figure.at(0.99)),
-                number(figure.at(0.999)),
-                number(max.unwrap_or(f64::NAN)),
-            ]);
-        }
-        out += &crate::run::table(&rows, 2);
-        for ratio in &self.ratios {
-            out += &format!(
-                "  {}: {:.2} (ours {}, theirs {})\n",
-                ratio.name,
-                ratio.value,
-                number(ratio.ours),
-                number(ratio.theirs)
-            );
-        }
-        out
+        let row = |bench: &Bench| format!("{:<7} {}\n        goal: {}", bench.name, bench.what, bench.goal);
+        let mut rows: Vec<String> = BENCHES.iter().map(row).collect();
+        rows.push(format!("{:<7} {}", load::NAME, load::WHAT));
+        terminal::say(&rows.join("\n"));
     }
 }
 
@@ -193,13 +150,25 @@ impl Outcome {
 mod tests {
     use super::*;
 
+    /// Each with as few rounds and samples as there can be: what it gives has its form. How long anything took is not looked at.
     #[test]
-    fn percentiles_are_values_that_were_measured() {
-        let measured = Measured::new("x", "ns", (1..=1000).rev().map(f64::from).collect());
-        assert_eq!(
-            [0.0, 0.5, 0.99, 0.999, 1.0].map(|share| measured.at(share)),
-            [1.0, 500.0, 990.0, 999.0, 1000.0]
-        );
-        assert_eq!(median(vec![3.0, 1.0, 2.0]), 2.0);
+    fn every_bench_gives_figures_and_names_the_ratios_that_want_another_system() {
+        let registry = agents::registry();
+        let setting = Setting { registry: &registry, peers: None, program: None, shorter: 1000 };
+        for bench in BENCHES {
+            let outcome = (bench.measure)(&setting).unwrap();
+            let document = outcome.to_json(bench.name);
+            let figures = document["figures"].as_array().unwrap();
+            assert!(!figures.is_empty(), "{}", bench.name);
+            for figure in figures {
+                assert!(figure["n"].as_u64() > Some(0), "{}: {figure}", bench.name);
+                assert!(figure["p50"].as_f64() <= figure["max"].as_f64(), "{}: {figure}", bench.name);
+            }
+            let named: Vec<&str> = outcome.ratios.iter().map(|ratio| ratio.name).collect();
+            for name in bench.goal.split([' ', ',']).filter(|word| word.contains('/')) {
+                assert!(named.contains(&name) || outcome.missing.contains(&name), "{}: {name}", bench.name);
+            }
+            assert!(outcome.to_text(bench.name).starts_with(bench.name));
+        }
     }
 }

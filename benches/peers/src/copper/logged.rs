@@ -3,10 +3,11 @@
 use cu29::prelude::*;
 
 use super::log::{LogFolder, iterations_in};
+use super::part::Part;
 use super::tasks::{self, Hand, Parcel, Sink, Source};
 use super::{document, failed};
 use crate::document::{Document, Figure};
-use crate::machine::{now, process_time, room, settle, sleep_until, thread_time};
+use crate::machine::settle;
 use crate::settings::Settings;
 
 /// `iteration_each`, `hop`: as without a log. Of the processor, for each iteration, as means of a tenth of the run: `work`: what the
@@ -71,35 +72,4 @@ pub(crate) fn measure(settings: &Settings) -> Result<Document, String> {
             Figure::new("log_size", "B", vec![folder.size() as f64]),
         ],
     ))
-}
-
-/// A part of a run: the time of each iteration, and mean processor times of one (ns).
-struct Part {
-    spans: Vec<u64>,
-    /// Of the thread, in the iterations alone, with what reading the clocks takes.
-    work: f64,
-    /// Of the thread, with all that it does.
-    thread: f64,
-    /// Of all threads.
-    process: f64,
-}
-
-impl Part {
-    /// Iterations at a period (ns); between them the thread sleeps.
-    fn run(iterations: u64, period: u64, clock: &RobotClock, mut iterate: impl FnMut()) -> Part {
-        let mut spans = room(iterations);
-        let (begun, all, own) = (now(), process_time(), thread_time());
-        let mut work = 0;
-        for round in 1..=iterations {
-            sleep_until(begun + round * period);
-            let used = thread_time();
-            let before = clock.now();
-            iterate();
-            spans.push((clock.now() - before).as_nanos());
-            work += thread_time() - used;
-        }
-        let mean = |total: u64| total as f64 / iterations as f64;
-        let (thread, process) = (mean(thread_time() - own), mean(process_time() - all));
-        Part { spans, work: mean(work), thread, process }
-    }
 }

@@ -10,7 +10,8 @@ use sim::{Model, Simulator, WorldPlan};
 use types::geometry::TAU;
 use types::{Duration, Point, Pose, Time};
 
-use super::{Measured, Outcome};
+use super::Setting;
+use super::outcome::{Measured, Outcome};
 use crate::error::Failure;
 use crate::file;
 use crate::run::{Facts, Judge, LogFile, Scenario, choice, failure, with_robots};
@@ -23,7 +24,7 @@ const LENGTH: Duration = Duration::secs(300);
 /// What a robot without eyes does not have.
 const EYES: [&str; 3] = ["camera", "track", "head"];
 
-pub(super) fn measure(registry: &Registry) -> Result<Outcome, Failure> {
+pub(super) fn measure(setting: &Setting<'_>) -> Result<Outcome, Failure> {
     let mut outcome = Outcome::default();
     let kinds = [
         ("exploration", false, false),
@@ -33,7 +34,7 @@ pub(super) fn measure(registry: &Registry) -> Result<Outcome, Failure> {
     for (name, eyes, log) in kinds {
         let mut speeds = Vec::new();
         for seed in 1..=RUNS {
-            speeds.push(exploration(registry, seed, eyes, log)?);
+            speeds.push(exploration(setting.registry, seed, eyes, log)?);
         }
         outcome.figures.push(Measured::new(name, "x real time", speeds));
     }

@@ -1,0 +1,115 @@
+//! Runs with a log of every message, and what is found in the file afterwards.
+
+use std::path::PathBuf;
+
+use record::log::RunInfo;
+use runtime::{LogChoice, Options, Plan, Registry};
+use types::Duration;
+
+use crate::bench::outcome::Outcome;
+use crate::bench::parcel::{self, live, now, pin, thread, thread_time};
+use crate::error::Failure;
+use crate::run::{Facts, LogFile};
+
+use super::CPU;
+
+/// Sleeps in a measurement of what sleeping costs.
+const SLEEPS: u64 = 5000;
+
+/// What became of the messages of a run.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Kept {
+    /// Sent by all outputs.
+    pub(super) sent: u64,
+    /// Of those, in the file.
+    pub(super) found: u64,
+    /// Lost before a receiver or before the log.
+    pub(super) lost: u64,
+    /// Releases that were passed over.
+    pub(super) skipped: u64,
+    /// The length of the file (bytes).
+    pub(super) size: u64,
+}
+
+impl Kept {
+    /// Whether every message is where it belongs.
+    pub(super) fn is_all(&self) -> bool {
+        self.lost == 0 && self.found == self.sent
+    }
+
+    /// Why the run does not count.
+    pub(super) fn failure(&self) -> Option<Failure> {
+        let Kept { sent, found, lost, .. } = self;
+        let what = || format!("of {sent} messages {found} are in the log, and {lost} were dropped");
+        (!self.is_all()).then(|| Failure::new(what()).code(1))
+    }
+}
+
+/// A file that is gone when this is dropped.
+struct Scratch(PathBuf);
+
+impl Drop for Scratch {
+    fn drop(&mut self) {
+        // What cannot be removed is left to whoever cleans the temporary folder.
+        let _ = std::fs::remove_file(&self.0);
+    }
+}
+
+/// Runs a plan with a log of all that is sent, and counts what is in it.
+pub(super) fn run(
+    plan: &Plan,
+    registry: &Registry,
+    options: Options,
+    outcome: &mut Outcome,
+) -> Result<Kept, Failure> {
+    let path = std::env::temp_dir().join(format!("sinew-bench-{}.mcap", std::process::id()));
+    let scratch = Scratch(path);
+    let failed = |error: &dyn std::fmt::Display| Failure::new(error.to_string()).code(1);
+    let info = RunInfo { system: plan.name.clone(), ..RunInfo::default() };
+    let (file, written) =
+        LogFile::create(&scratch.0, &info, 0.0, Facts::default()).map_err(|error| failed(&error))?;
+    let options = Options { recorder: Some(Box::new(file)), log: LogChoice::by(|_, _| 1), ..options };
+    let report = parcel::run(live(plan, registry, options)?, outcome)?;
+    let errors = written.lock().map(|written| written.errors.clone()).unwrap_or_default();
+    if let Some(error) = errors.first() {
+        return Err(failed(error));
+    }
+    let info = record::log::info(&scratch.0).map_err(|error| failed(&error))?;
+    let outputs: Vec<(String, u64)> = report
+        .view
+        .agents
+        .iter()
+        .flat_map(|agent| {
+            agent.ports.iter().map(|port| (format!("/{}/{}", agent.name, port.name), port.sent))
+        })
+        .collect();
+    let found = |topic: &String| info.topics.iter().find(|found| found.topic == *topic);
+    Ok(Kept {
+        sent: outputs.iter().map(|(_, sent)| sent).sum(),
+        found: outputs.iter().filter_map(|(topic, _)| found(topic)).map(|topic| topic.messages).sum(),
+        lost: report.log_dropped
+            + report.view.wires.iter().map(|wire| wire.dropped + wire.refused).sum::<u64>(),
+        skipped: report.view.agents.iter().map(|agent| agent.counts.skipped).sum(),
+        size: std::fs::metadata(&scratch.0).map_or(0, |data| data.len()),
+    })
+}
+
+/// What it costs a bare thread to sleep until the next of many times at a period (ns of its processor): it is no part of the work.
+pub(super) fn idle(period: Duration) -> Result<f64, Failure> {
+    let sleeps = thread("bench-sleeps", move || {
+        pin(CPU);
+        let _ = rustix::thread::set_current_timer_slack(core::num::NonZeroU64::new(1));
+        let (begun, used, period) = (now(), thread_time(), period.0 as u64);
+        for round in 1..=SLEEPS {
+            sleep_until(begun + round * period);
+        }
+        (thread_time() - used) as f64 / SLEEPS as f64
+    })?;
+    parcel::end(sleeps)
+}
+
+fn sleep_until(time: u64) {
+    use rustix::time::{ClockId, Timespec};
+    let wanted = Timespec { tv_sec: (time / 1_000_000_000) as _, tv_nsec: (time % 1_000_000_000) as _ };
+    while rustix::thread::clock_nanosleep_absolute(ClockId::Monotonic, &wanted).is_err() && now() < time {}
+}
