@@ -8,11 +8,12 @@
 //! | what can be measured | [`measurements`] |
 //! | copper: hop, hop with its log, caterpillar | [`copper`] |
 //! | queues in one thread | [`rings`], [`channels`] |
-//! | the machine's own limits | [`futex`], [`nanosleep`], [`spin`] |
+//! | the machine's own limits | [`futex`], [`chain`], [`nanosleep`], [`spin`] |
 //! | shared memory | `iceoryx2`, where that feature is on |
 //! | the document | [`document`] |
 #![allow(clippy::print_stdout, reason = "a program for the terminal")]
 
+mod chain;
 mod channels;
 mod copper;
 mod document;

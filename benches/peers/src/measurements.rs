@@ -2,7 +2,7 @@
 
 use crate::document::Document;
 use crate::settings::Settings;
-use crate::{channels, copper, futex, nanosleep, rings, spin};
+use crate::{chain, channels, copper, futex, nanosleep, rings, spin};
 
 /// One measurement.
 pub(crate) struct Measurement {
@@ -63,6 +63,13 @@ pub(crate) const ALL: &[Measurement] = &[
         peer: futex::PEER,
         figures: futex::FIGURES,
         measure: futex::measure,
+    },
+    Measurement {
+        name: "chain",
+        what: "three bare threads of falling priority that wake each other in a ring",
+        peer: chain::PEER,
+        figures: chain::FIGURES,
+        measure: chain::measure,
     },
     #[cfg(feature = "iceoryx2")]
     Measurement {

@@ -8,12 +8,14 @@
 //! | other systems, and rounds in which ours and theirs take turns | [`peers`], [`turns`] |
 //! | what the agents of the measurements share | [`parcel`] |
 
+mod grow;
 mod hop;
 mod load;
 mod machine;
 mod outcome;
 mod parcel;
 mod peers;
+mod reflex;
 mod simulation;
 mod spin;
 mod threads;
@@ -67,10 +69,22 @@ const BENCHES: &[Bench] = &[
         measure: wake::measure,
     },
     Bench {
+        name: "reflex",
+        what: "from a contact to the zero command at the wheels, over sensor, safety monitor, coordinator and gate",
+        goal: "reflex/bare_chain 1.25",
+        measure: reflex::measure,
+    },
+    Bench {
         name: "sim",
         what: "how many times as fast as real time simulations run",
         goal: "1000 robots with twelve sonars and a laser in one world: real time",
         measure: simulation::measure,
+    },
+    Bench {
+        name: "grow",
+        what: "adding an agent to a live system of 1000 and removing it; up to 10 000 agents at 10 Hz in simulated time",
+        goal: "a change in less than 1 ms whatever is wired elsewhere; a step as long among 10 000 as among 1000, and 20 times real time",
+        measure: grow::measure,
     },
 ];
 

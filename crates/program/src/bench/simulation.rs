@@ -19,13 +19,18 @@ use crate::terminal::host_now;
 
 /// Runs of each kind; the same seeds in each.
 const RUNS: u64 = 3;
-/// How much of the scenario is run (simulated time): about as long as the robot needs to its goal.
-const LENGTH: Duration = Duration::secs(300);
+/// How much of the scenario is run (s of simulated time): about as long as the robot needs to its goal.
+const LENGTH: usize = 300;
+/// Robots in one world, and how long they drive together (s of all robots).
+const ROBOTS: [usize; 4] = [1, 10, 100, 1000];
+const ROBOT_SECONDS: usize = 10_000;
 /// What a robot without eyes does not have.
 const EYES: [&str; 3] = ["camera", "track", "head"];
 
 pub(super) fn measure(setting: &Setting<'_>) -> Result<Outcome, Failure> {
     let mut outcome = Outcome::default();
+    let runs = setting.of(RUNS as usize, 1) as u64;
+    let length = Duration::secs(setting.of(LENGTH, 2) as i64);
     let kinds = [
         ("exploration", false, false),
         ("exploration_log", false, true),
@@ -33,20 +38,28 @@ pub(super) fn measure(setting: &Setting<'_>) -> Result<Outcome, Failure> {
     ];
     for (name, eyes, log) in kinds {
         let mut speeds = Vec::new();
-        for seed in 1..=RUNS {
-            speeds.push(exploration(setting.registry, seed, eyes, log)?);
+        for seed in 1..=runs {
+            speeds.push(exploration(setting.registry, seed, eyes, log, length)?);
         }
         outcome.figures.push(Measured::new(name, "x real time", speeds));
     }
-    for count in [1, 10, 100] {
-        let speeds = (0..RUNS).map(|seed| robots(count, seed)).collect();
+    for count in ROBOTS {
+        // As many steps of robots in each, but no less than a second.
+        let length = Duration::secs((setting.of(ROBOT_SECONDS, 10) / count).clamp(1, 60) as i64);
+        let speeds = (0..runs).map(|seed| robots(count, seed, length)).collect();
         outcome.figures.push(Measured::new(format!("robots_{count}"), "x real time", speeds));
     }
     Ok(outcome)
 }
 
 /// The scenario with or without its eyes and its log.
-fn exploration(registry: &Registry, seed: u64, eyes: bool, log: bool) -> Result<f64, Failure> {
+fn exploration(
+    registry: &Registry,
+    seed: u64,
+    eyes: bool,
+    log: bool,
+    length: Duration,
+) -> Result<f64, Failure> {
     let registry = with_robots(registry.clone());
     let mut loaded = file::load("exploration", &[], &registry)?;
     if !eyes {
@@ -59,7 +72,7 @@ fn exploration(registry: &Registry, seed: u64, eyes: bool, log: bool) -> Result<
     let facts = Facts::default();
     let recorder = if log { Some(recorder(&facts, seed)?) } else { None };
     let options = Options {
-        limit: Some(LENGTH),
+        limit: Some(length),
         log: if log { choice(&ready, 0.0) } else { Default::default() },
         observer: Box::new(Judge::new(&ready, Arc::new(AtomicBool::new(false)), log.then_some(facts))),
         recorder,
@@ -83,7 +96,7 @@ fn recorder(facts: &Facts, seed: u64) -> Result<Box<dyn Recorder>, Failure> {
 }
 
 /// The simulator alone: so many robots that drive in circles, each with twelve sonars (4 Hz) and a laser of 180 beams (10 Hz).
-fn robots(count: usize, seed: u64) -> f64 {
+fn robots(count: usize, seed: u64, length: Duration) -> f64 {
     let side = (count as f64).sqrt().ceil();
     let room = 4.0 * side + 2.0;
     let mut world = WorldPlan::hall(room, room);
@@ -106,7 +119,6 @@ fn robots(count: usize, seed: u64) -> f64 {
         }
     }
     let ids: Vec<_> = simulator.robots().collect();
-    let length = if count > 10 { Duration::secs(10) } else { Duration::secs(60) };
     let (mut ring, mut scan) = ([0f32; 32], [0f32; 180]);
     let begun = host_now();
     let mut step = 0u64;

@@ -49,6 +49,11 @@ impl Turns {
             outcome.compare(name, rounds);
         }
     }
+
+    /// What went wrong.
+    pub(super) fn failure(self) -> Option<Failure> {
+        self.failure
+    }
 }
 
 /// The mean.
