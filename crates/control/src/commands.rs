@@ -99,11 +99,16 @@ impl Commands {
         }
         let request = words::parse(words)?;
         let changes_agents = changes_agents(&request);
-        self.control.request(request)?;
+        self.request(request)?;
         if changes_agents {
             self.taps.renew();
         }
         Ok(true.into())
+    }
+
+    fn request(&self, request: Request) -> Result<(), Refusal> {
+        self.hooks.asks(&request);
+        self.control.request(request)
     }
 
     fn tap(&self, asker: &Asker, rest: &[String]) -> Answer {
@@ -129,11 +134,11 @@ impl Commands {
         let (port, pairs) = port("send", rest)?;
         if message.is_none() && pairs.first().is_some_and(|word| word.starts_with("cdr=")) {
             let words: Vec<String> = ["send".to_owned()].into_iter().chain(rest.iter().cloned()).collect();
-            return self.control.request(words::parse(&words)?).map(|()| true.into());
+            return self.request(words::parse(&words)?).map(|()| true.into());
         }
         let message = message_of("send", pairs, message)?;
         let cdr = self.encode(port, &message)?;
-        self.control.request(Request::Send { port: port.to_owned(), cdr })?;
+        self.request(Request::Send { port: port.to_owned(), cdr })?;
         Ok(true.into())
     }
 

@@ -21,7 +21,7 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::thread::{Builder, JoinHandle};
 use std::time::Duration;
 
-use runtime::{Control, Refusal, RunFolder};
+use runtime::{Control, Refusal, Request, RunFolder};
 use serde_json::Value as Json;
 use types::definition::Definition;
 
@@ -37,6 +37,11 @@ use crate::words::Usage;
 ///
 /// It is called from one thread for each client, several at once.
 pub trait Hooks: Send + Sync + 'static {
+    /// A request is on its way to the system. It may still be refused.
+    fn asks(&self, request: &Request) {
+        let _ = request;
+    }
+
     /// Sets the emergency stop; `why` is what the person said, and may be empty.
     ///
     /// # Errors

@@ -77,6 +77,10 @@ pub(crate) struct RunArgs {
     /// The file of a recorded robot, for the scenario "recorded": a CARMEN log, wheel counts, or our own .mcap.
     #[arg(long, value_name = "FILE")]
     pub(crate) from: Option<PathBuf>,
+    /// The log of a simulated run: runs it again with its seed and all that was asked in it while it went, and says whether the
+    /// bytes are the same. Other options are to be those of that run.
+    #[arg(long, value_name = "F.mcap", conflicts_with_all = ["seed", "seeds", "from"])]
+    pub(crate) repeat: Option<PathBuf>,
     /// Where the log goes; else DIR/run.mcap.
     #[arg(long, value_name = "F.mcap", conflicts_with = "no_log")]
     pub(crate) log: Option<PathBuf>,

@@ -3,9 +3,11 @@
 mod cargo;
 mod fuzz;
 mod lessons;
+mod live;
 mod log;
 mod new_agent;
 mod recorded;
+mod repeat;
 mod scenarios;
 mod setup;
 mod sinew;
@@ -36,7 +38,7 @@ pub(crate) struct Step {
 }
 
 /// In the order in which mistakes are cheapest to find.
-pub(crate) const ALL: [Step; 12] = [
+pub(crate) const ALL: [Step; 13] = [
     Step {
         name: "format",
         shows: "every file is as rustfmt writes it",
@@ -90,6 +92,12 @@ pub(crate) const ALL: [Step; 12] = [
         shows: "exploration and annex over ten seeds",
         needs: &[Need::Compiler],
         run: scenarios::run,
+    },
+    Step {
+        name: "repeat",
+        shows: "the same plan, seed and requests give the same bytes",
+        needs: &[Need::Compiler],
+        run: repeat::run,
     },
     Step {
         name: "recorded",

@@ -1,7 +1,6 @@
 //! How many times as fast as real time simulations run.
 
 use std::sync::Arc;
-use std::sync::atomic::AtomicBool;
 
 use record::log::RunInfo;
 use runtime::{Options, Recorder, Registry, Simulation};
@@ -14,7 +13,7 @@ use super::Setting;
 use super::outcome::{Measured, Outcome};
 use crate::error::Failure;
 use crate::file;
-use crate::run::{Facts, Judge, LogFile, Scenario, choice, failure, with_robots};
+use crate::run::{Asked, Facts, Judge, LogFile, Scenario, choice, failure, with_robots};
 use crate::terminal::host_now;
 
 /// Runs of each kind; the same seeds in each.
@@ -74,7 +73,7 @@ fn exploration(
     let options = Options {
         limit: Some(length),
         log: if log { choice(&ready, 0.0) } else { Default::default() },
-        observer: Box::new(Judge::new(&ready, Arc::new(AtomicBool::new(false)), log.then_some(facts))),
+        observer: Box::new(Judge::new(&ready, Arc::default(), Asked::default(), log.then_some(facts))),
         recorder,
         parse: control::words::parse,
         ..Options::default()
@@ -88,7 +87,7 @@ fn exploration(
 fn recorder(facts: &Facts, seed: u64) -> Result<Box<dyn Recorder>, Failure> {
     let path = std::env::temp_dir().join(format!("sinew-bench-{}.mcap", std::process::id()));
     let run = RunInfo { system: "exploration".into(), seed: Some(seed), ..RunInfo::default() };
-    let made = LogFile::create(&path, &run, 0.0, facts.clone());
+    let made = LogFile::create(&path, &run, 0.0, facts.clone(), Asked::default());
     // The open file lives on without its name until it is closed.
     let _ = std::fs::remove_file(&path);
     made.map(|(file, _)| Box::new(file) as Box<dyn Recorder>)

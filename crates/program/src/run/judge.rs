@@ -4,13 +4,17 @@ use std::collections::VecDeque;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, PoisonError};
 
+use hardware::Latch;
 use hardware::gate::Counts;
+use hardware::latch::Cause;
 use hardware::simulated::Truth;
 use runtime::{Incident, Observer, Verdict};
 use types::messages::{Odometry, Twist};
 use types::{Duration, Name, Pose, Time};
 
+use super::asked::{Asked, Deed, OUTSIDE};
 use super::prepare::Ready;
+use crate::terminal;
 
 /// How often the judge looks. Goals and collisions are watched by the world itself in every step of physics, so this only
 /// says how late a run ends.
@@ -20,13 +24,27 @@ const KEEP_EVERY: u64 = 5;
 /// The frame of the simulated world in the log.
 pub(crate) const WORLD: &str = "world";
 
-/// Where something truly was.
-#[derive(Clone, Copy, Debug)]
+/// What the judge has for the log.
+#[derive(Clone, Debug)]
 pub(crate) struct Fact {
     /// When, on the clock of the run.
     pub(crate) time: Time,
-    /// Whose, and where.
-    pub(crate) odometry: Odometry,
+    /// What.
+    pub(crate) what: What,
+}
+
+/// What a fact is of.
+#[derive(Clone, Debug)]
+pub(crate) enum What {
+    /// Something truly was there.
+    Place(Odometry),
+    /// Somebody asked for something.
+    Asked {
+        /// Who.
+        by: &'static str,
+        /// For what, as a note has it.
+        text: String,
+    },
 }
 
 /// The truth on its way from the judge to the log.
@@ -51,6 +69,11 @@ pub(crate) struct Judge {
     recordings: Vec<Arc<Counts>>,
     /// Set by a signal.
     asked_to_end: Arc<AtomicBool>,
+    asked: Asked,
+    latches: Vec<Latch>,
+    /// How many times as fast as the host's clock the run may go at most, and when it began on both clocks.
+    speed: Option<f64>,
+    begun: Option<(Time, std::time::Instant)>,
     /// Where the truth goes; nobody wants it when nothing is logged.
     facts: Option<Facts>,
     people: Vec<String>,
@@ -65,7 +88,12 @@ pub(crate) const INTERRUPTED: &str = "interrupted";
 pub(crate) const PLAYED: &str = "the recording is over";
 
 impl Judge {
-    pub(crate) fn new(ready: &Ready, asked_to_end: Arc<AtomicBool>, facts: Option<Facts>) -> Judge {
+    pub(crate) fn new(
+        ready: &Ready,
+        asked_to_end: Arc<AtomicBool>,
+        asked: Asked,
+        facts: Option<Facts>,
+    ) -> Judge {
         let recorded =
             ready.robots.iter().filter(|robot| robot.description.clock == hardware::ClockKind::Recorded);
         let people = ready.truth.iter().flat_map(|truth| truth.plan().people.iter());
@@ -74,8 +102,52 @@ impl Judge {
             truth: ready.truth.clone(),
             recordings: recorded.map(|robot| robot.counts.clone()).collect(),
             asked_to_end,
+            asked,
+            latches: ready.robots.iter().map(|robot| robot.latch.clone()).collect(),
+            speed: None,
+            begun: None,
             facts,
             looks: 0,
+        }
+    }
+
+    /// Lets the run go at most so many times as fast as the host's clock. It waits here and not in the runtime, which would
+    /// answer requests while it waits: in the middle of an instant, where no repeated run could ask them again.
+    pub(crate) fn paced(mut self, speed: Option<f64>) -> Judge {
+        self.speed = speed;
+        self
+    }
+
+    fn wait(&self, since_start: Duration) {
+        let (Some(speed), Some((_, host))) = (self.speed, self.begun) else { return };
+        let due = std::time::Duration::try_from_secs_f64(since_start.seconds() / speed);
+        let due = due.unwrap_or(std::time::Duration::MAX);
+        terminal::pause(due.saturating_sub(host.elapsed()));
+    }
+
+    /// Does what is asked of the robots. Says whether the run shall end by it.
+    fn act(&self, now: Time, since_start: Duration) -> bool {
+        let mut ends = false;
+        for due in self.asked.due(since_start) {
+            match &due.deed {
+                Deed::Stop(_) => self.latches.iter().for_each(|latch| latch.set(Cause::Person, now)),
+                Deed::Reset => self.latches.iter().for_each(|latch| {
+                    latch.reset(now);
+                }),
+                Deed::Interrupt => ends = true,
+            }
+            self.note(now, due.by, &due.deed);
+            if let Some(done) = due.done {
+                // Whoever asked may be gone.
+                let _ = done.try_send(());
+            }
+        }
+        ends
+    }
+
+    fn note(&self, time: Time, by: &'static str, deed: &Deed) {
+        if let Some(facts) = &self.facts {
+            facts.put(Fact { time, what: What::Asked { by, text: deed.note() } });
         }
     }
 
@@ -95,7 +167,14 @@ impl Judge {
 }
 
 fn fact(time: Time, name: &str, pose: Pose, twist: Twist) -> Fact {
-    Fact { time, odometry: Odometry { frame: Name::new(WORLD), body: Name::new(name), pose, twist } }
+    let odometry = Odometry { frame: Name::new(WORLD), body: Name::new(name), pose, twist };
+    Fact { time, what: What::Place(odometry) }
+}
+
+impl Drop for Judge {
+    fn drop(&mut self) {
+        self.asked.end();
+    }
 }
 
 impl Observer for Judge {
@@ -104,12 +183,19 @@ impl Observer for Judge {
     }
 
     fn observe(&mut self, now: Time, _: &[Incident]) -> Verdict {
+        let (begun, _) = *self.begun.get_or_insert_with(|| (now, terminal::host_now()));
+        let since_start = Duration(now.0 - begun.0);
+        self.wait(since_start);
         if self.looks.is_multiple_of(KEEP_EVERY) {
             self.keep(now);
         }
         self.looks += 1;
         let ended = |why: &str| Verdict::End(why.to_owned());
+        if self.act(now, since_start) {
+            return ended(INTERRUPTED);
+        }
         if self.asked_to_end.load(Ordering::Relaxed) {
+            self.note(now, OUTSIDE, &Deed::Interrupt);
             return ended(INTERRUPTED);
         }
         if self.truth.as_ref().is_some_and(Truth::decided) {

@@ -6,6 +6,7 @@
 //!                                     Judge ─────┘         log ◀┘  └▶ screen, control
 //! ```
 
+mod asked;
 mod judge;
 mod options;
 mod prepare;
@@ -29,7 +30,9 @@ use types::Duration;
 use crate::cli::{ClockChoice, RunArgs, Speed};
 use crate::error::Failure;
 use crate::{figures, file, terminal};
+use asked::Repeat;
 
+pub(crate) use asked::Asked;
 pub(crate) use judge::{Facts, Judge, WORLD};
 pub(crate) use prepare::{ROBOT_KIND, Ready, Scenario};
 pub(crate) use recorder::{LogFile, choice};
@@ -50,12 +53,20 @@ pub(crate) fn run(args: &RunArgs, registry: Registry, json: bool) -> Result<Exit
     if let Some(range) = args.seeds {
         return seeds::run(args, &scenario, range, &asked_to_end, json);
     }
-    let ready = scenario.prepare(args.seed)?;
+    let name = &scenario.file.plan.name;
+    let repeat = args.repeat.as_ref().map(|path| Repeat::read(path, name)).transpose()?;
+    let seed = repeat.as_ref().map_or(args.seed, |repeat| repeat.seed);
+    let ready = scenario.prepare(seed)?;
     let clock = options::clock(args, &ready)?;
+    if repeat.is_some() && clock == ClockChoice::Wall {
+        return Err(
+            Failure::new("a run on the wall clock never happens twice").help("leave out --clock wall")
+        );
+    }
     let watched = !json && terminal::watched();
-    let place = Place::of(args, &scenario.file.plan.name, args.seed)?;
+    let place = Place::of(args, name, seed)?;
     let whole =
-        One { args, scenario: &scenario, seed: args.seed, clock, watched, place, asked_to_end, serves: true };
+        One { args, scenario: &scenario, seed, clock, watched, place, asked_to_end, serves: true, repeat };
     let summary = whole.run(ready)?;
     if json {
         terminal::say_json(&summary.to_json());
@@ -97,8 +108,19 @@ impl Place {
         if args.no_log && args.out.is_none() {
             return Ok(None);
         }
-        let folder = args.out.clone().unwrap_or_else(|| Path::new("out").join(format!("{name}-seed{seed}")));
-        Place::in_folder(folder, args).map(Some)
+        let again = if args.repeat.is_some() { "-repeated" } else { "" };
+        let usual = || Path::new("out").join(format!("{name}-seed{seed}{again}"));
+        let place = Place::in_folder(args.out.clone().unwrap_or_else(usual), args)?;
+        if let (Some(before), Some(log)) = (&args.repeat, &place.log)
+            && before.canonicalize().is_ok_and(|before| log.canonicalize().is_ok_and(|log| log == before))
+        {
+            return Err(Failure::new(format!(
+                "{} would be written over while it is repeated",
+                log.display()
+            ))
+            .help("--out names another folder, --log another file"));
+        }
+        Ok(Some(place))
     }
 
     fn in_folder(folder: PathBuf, args: &RunArgs) -> Result<Place, Failure> {
@@ -123,20 +145,26 @@ struct One<'a> {
     asked_to_end: Arc<AtomicBool>,
     /// Whether others can ask it while it runs.
     serves: bool,
+    /// The log of the run that this one repeats.
+    repeat: Option<Repeat>,
 }
 
 impl One<'_> {
     fn run(&self, ready: Ready) -> Result<Summary, Failure> {
-        let log = self.log(&ready)?;
+        let mut plan = ready.plan.clone();
+        let asked = Asked::of(&mut plan, self.repeat.as_ref());
+        let log = self.log(&ready, &asked)?;
         let facts = log.as_ref().map(|(_, facts, _)| facts.clone());
-        let judge = judge::Judge::new(&ready, self.asked_to_end.clone(), facts);
+        let judge = judge::Judge::new(&ready, self.asked_to_end.clone(), asked.clone(), facts);
+        let judge = judge.paced(self.speed().filter(|_| self.clock == ClockChoice::Sim));
         let (recorder, outcome) = match log {
             Some((file, _, outcome)) => (Some(Box::new(file) as Box<dyn Recorder>), Some(outcome)),
             None => (None, None),
         };
         let options = Options {
             limit: self.limit(&ready),
-            speed: self.speed(),
+            // The judge waits for the host's clock.
+            speed: None,
             log: if recorder.is_some() {
                 recorder::choice(&ready, self.args.images)
             } else {
@@ -146,17 +174,31 @@ impl One<'_> {
             observer: Box::new(judge),
             parse: control::words::parse,
         };
-        let report = self.play(&ready, options)?;
+        let report = self.play(&ready, &plan, &asked, options)?;
         let mut summary = Summary::new(&ready, self.seed, clock_name(self.clock), report);
         summary.images = self.args.images;
         summary.log = outcome.map(|outcome| outcome.lock().unwrap_or_else(PoisonError::into_inner).clone());
+        summary.repeats(&asked);
+        summary.repeat = self.repeat.as_ref().map(|repeat| self.compared(repeat, &ready));
         self.write_files(&mut summary);
         Ok(summary)
+    }
+
+    /// What became of a repeated run.
+    fn compared(&self, repeat: &Repeat, ready: &Ready) -> summary::Repeated {
+        let log = self.place.as_ref().and_then(|place| place.log.as_ref());
+        let differs = match log {
+            Some(log) if repeat.plan == plan_text(ready) => asked::difference(&repeat.path, log),
+            Some(_) => Some("the plan is another one".to_owned()),
+            None => Some("nothing was logged that could be compared".to_owned()),
+        };
+        summary::Repeated { log: repeat.path.clone(), requests: repeat.asked.len(), differs }
     }
 
     fn log(
         &self,
         ready: &Ready,
+        asked: &Asked,
     ) -> Result<Option<(recorder::LogFile, judge::Facts, recorder::SharedOutcome)>, Failure> {
         let Some(path) = self.place.as_ref().and_then(|place| place.log.as_ref()) else { return Ok(None) };
         let run = RunInfo {
@@ -166,14 +208,14 @@ impl One<'_> {
                 ClockChoice::Sim => record::log::Clock::Simulated,
                 ClockChoice::Wall => record::log::Clock::Wall,
             },
-            plan: file::write_plan(&plan_of_file(ready.plan.clone())),
+            plan: plan_text(ready),
             notes: figures::notes(ready),
         };
         let facts = judge::Facts::default();
-        let (file, outcome) = recorder::LogFile::create(path, &run, self.args.images, facts.clone())
-            .map_err(|error| {
-                Failure::new(error.to_string()).help("--log names another file, --no-log writes none")
-            })?;
+        let file = recorder::LogFile::create(path, &run, self.args.images, facts.clone(), asked.clone());
+        let (file, outcome) = file.map_err(|error| {
+            Failure::new(error.to_string()).help("--log names another file, --no-log writes none")
+        })?;
         Ok(Some((file, facts, outcome)))
     }
 
@@ -195,20 +237,20 @@ impl One<'_> {
     }
 
     /// Runs it, and meanwhile draws it and answers others.
-    fn play(&self, ready: &Ready, options: Options) -> Result<Report, Failure> {
+    fn play(&self, ready: &Ready, plan: &Plan, asked: &Asked, options: Options) -> Result<Report, Failure> {
         let sources = &self.scenario.file.sources;
         let cannot = |error: CannotRun| summary::failure(error, sources);
         match self.clock {
             ClockChoice::Sim => {
-                let simulation = Simulation::new(&ready.plan, &ready.registry, options).map_err(cannot)?;
-                let beside = self.beside(ready, simulation.control())?;
+                let simulation = Simulation::new(plan, &ready.registry, options).map_err(cannot)?;
+                let beside = self.beside(ready, simulation.control(), asked)?;
                 let report = simulation.run();
                 beside.end();
                 report.map_err(cannot)
             }
             ClockChoice::Wall => {
-                let live = Live::new(&ready.plan, &ready.registry, options).map_err(cannot)?;
-                let beside = self.beside(ready, live.control())?;
+                let live = Live::new(plan, &ready.registry, options).map_err(cannot)?;
+                let beside = self.beside(ready, live.control(), asked)?;
                 let report = live.run();
                 beside.end();
                 report.map_err(cannot)
@@ -216,9 +258,9 @@ impl One<'_> {
         }
     }
 
-    fn beside(&self, ready: &Ready, control: Control) -> Result<Beside, Failure> {
+    fn beside(&self, ready: &Ready, control: Control, asked: &Asked) -> Result<Beside, Failure> {
         Ok(Beside {
-            server: if self.serves { serve::start(ready, &control) } else { None },
+            server: if self.serves { serve::start(ready, &control, asked, self.clock) } else { None },
             screen: if self.watched { Some(screen::Screen::start(ready, control)?) } else { None },
         })
     }
@@ -257,6 +299,11 @@ impl Beside {
     }
 }
 
+/// The system file of a run.
+fn plan_text(ready: &Ready) -> String {
+    file::write_plan(&plan_of_file(ready.plan.clone()))
+}
+
 /// The plan as its file has it: the gates' own types are a matter of the run.
 pub(crate) fn plan_of_file(mut plan: Plan) -> Plan {
     for agent in plan.agents.iter_mut().filter(|agent| agent.kind.starts_with(ROBOT_KIND)) {
@@ -293,12 +340,12 @@ mod tests {
         let ready = scenario.prepare(seed).unwrap();
         let facts = Facts::default();
         let run = RunInfo { notes: figures::notes(&ready), seed: Some(seed), ..RunInfo::default() };
-        let (log, _) = LogFile::create(path, &run, 1.0, facts.clone()).unwrap();
+        let (log, _) = LogFile::create(path, &run, 1.0, facts.clone(), Asked::default()).unwrap();
         let options = Options {
             limit: Some(limit),
             log: choice(&ready, 1.0),
             recorder: Some(Box::new(log)),
-            observer: Box::new(Judge::new(&ready, Arc::default(), Some(facts))),
+            observer: Box::new(Judge::new(&ready, Arc::default(), Asked::default(), Some(facts))),
             parse: control::words::parse,
             ..Options::default()
         };

@@ -1,6 +1,6 @@
 //! From what agents send to the log file.
 
-use std::collections::HashMap;
+use std::collections::{HashMap, VecDeque};
 use std::path::Path;
 use std::sync::{Arc, Mutex, PoisonError};
 
@@ -13,7 +13,8 @@ use types::message::{Message, describe};
 use types::messages::{FrameTransform, Image, Odometry, Transforms};
 use types::{Duration, Header, Time};
 
-use super::judge::Facts;
+use super::asked::{Asked, OUTSIDE};
+use super::judge::{Facts, What};
 use super::prepare::Ready;
 use crate::terminal;
 
@@ -43,6 +44,10 @@ pub(crate) struct LogFile {
     /// The least time between two pictures of an output.
     picture_gap: Duration,
     facts: Facts,
+    asked: Asked,
+    /// What was asked from outside, until time has gone on. At one instant it stands behind all else, whether it was asked in the
+    /// middle of the instant or, in a repeated run, at its beginning.
+    held: VecDeque<(Time, String)>,
     fact_numbers: HashMap<String, u64>,
     /// When the next place of each body goes to the frame tree.
     places: HashMap<String, Time>,
@@ -96,6 +101,7 @@ impl LogFile {
         run: &RunInfo,
         images: f64,
         facts: Facts,
+        asked: Asked,
     ) -> Result<(LogFile, SharedOutcome), WriteError> {
         let outcome = SharedOutcome::default();
         let file = LogFile {
@@ -105,6 +111,8 @@ impl LogFile {
             pictures: HashMap::new(),
             picture_gap: if images > 0.0 { Duration::from_seconds(1.0 / images) } else { Duration(i64::MAX) },
             facts,
+            asked,
+            held: VecDeque::new(),
             fact_numbers: HashMap::new(),
             places: HashMap::new(),
             scratch: cdr::Writer::new(),
@@ -155,15 +163,37 @@ impl LogFile {
     /// What the judge saw before `time`. All of it is there when a message of that time arrives, so the order is always the same.
     fn write_facts(&mut self, time: Time) {
         while let Some(fact) = self.facts.before(time) {
-            let topic = format!("/truth/{}", fact.odometry.body);
-            let number = self.fact_numbers.entry(topic.clone()).or_default();
-            let header = Header { stamp: fact.time, sequence: *number, ..Header::default() };
-            *number += 1;
-            let mut scratch = std::mem::take(&mut self.scratch);
-            scratch.clear();
-            fact.odometry.encode(&[] as &[NoElement], fact.time, &mut scratch);
-            self.write(&topic, &describe::<Odometry>, &header, scratch.bytes());
-            self.scratch = scratch;
+            self.write_held(fact.time);
+            match fact.what {
+                What::Place(odometry) => self.write_truth(fact.time, &odometry),
+                What::Asked { by, text } => self.write_note(fact.time, by, &text),
+            }
+        }
+        self.write_held(time);
+    }
+
+    fn write_held(&mut self, time: Time) {
+        while let Some((at, text)) = self.held.pop_front_if(|(at, _)| *at < time) {
+            self.write_note(at, OUTSIDE, &text);
+        }
+    }
+
+    fn write_truth(&mut self, time: Time, odometry: &Odometry) {
+        let topic = format!("/truth/{}", odometry.body);
+        let number = self.fact_numbers.entry(topic.clone()).or_default();
+        let header = Header { stamp: time, sequence: *number, ..Header::default() };
+        *number += 1;
+        let mut scratch = std::mem::take(&mut self.scratch);
+        scratch.clear();
+        odometry.encode(&[] as &[NoElement], time, &mut scratch);
+        self.write(&topic, &describe::<Odometry>, &header, scratch.bytes());
+        self.scratch = scratch;
+    }
+
+    fn write_note(&mut self, time: Time, who: &str, text: &str) {
+        let severity = severity(text);
+        if let Some(Err(error)) = self.writer.as_mut().map(|out| out.note(time, severity, who, text)) {
+            self.failed(error);
         }
     }
 
@@ -240,13 +270,14 @@ impl Recorder for LogFile {
 
     fn note(&mut self, time: Time, who: &str, text: &str) {
         self.write_facts(time);
-        let severity = severity(text);
-        if let Some(Err(error)) = self.writer.as_mut().map(|out| out.note(time, severity, who, text)) {
-            self.failed(error);
+        match self.asked.told(who, text) {
+            Some(text) => self.held.push_back((time, text)),
+            None => self.write_note(time, who, text),
         }
     }
 
     fn finish(&mut self) {
+        self.held.extend(self.asked.untold_end());
         self.write_facts(Time::NEVER);
         let Some(writer) = self.writer.take() else { return };
         let before = writer.tally();

@@ -98,7 +98,8 @@ fn one(
         None => None,
     };
     let asked_to_end = asked_to_end.clone();
-    One { args, scenario, seed, clock, watched: false, place, asked_to_end, serves: false }.run(ready)
+    One { args, scenario, seed, clock, watched: false, place, asked_to_end, serves: false, repeat: None }
+        .run(ready)
 }
 
 fn text(name: &str, range: Seeds, done: &BTreeMap<u64, Summary>, took: f64) -> String {

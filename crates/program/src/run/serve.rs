@@ -11,7 +11,7 @@ use control::{Hooks, Server};
 use hardware::Latch;
 use hardware::latch::Cause;
 use record::{dynamic, schema::Schema};
-use runtime::{AgentPlan, Control, Overload, Plan, Refusal, Registry, RunFolder, WirePlan};
+use runtime::{AgentPlan, Control, Overload, Plan, Refusal, Registry, Request, RunFolder, WirePlan};
 use serde_json::{Value as Json, json};
 use types::definition::Definition;
 use types::message::Message as _;
@@ -19,7 +19,9 @@ use types::messages::Decision;
 use types::value::Entry;
 use types::{Time, cdr};
 
+use super::asked::{Asked, Deed};
 use super::prepare::Ready;
+use crate::cli::ClockChoice;
 use crate::terminal;
 
 /// The control interface of a run, while it lasts.
@@ -35,7 +37,7 @@ const KEPT: usize = 256;
 const FETCH: HostDuration = HostDuration::from_millis(10);
 
 /// Opens the control interface. A run without it is still a run, so what goes wrong is told and no more.
-pub(super) fn start(ready: &Ready, control: &Control) -> Option<Serving> {
+pub(super) fn start(ready: &Ready, control: &Control, asked: &Asked, clock: ClockChoice) -> Option<Serving> {
     let warn = |text: String| {
         terminal::tell(&format!("warning: {text}; nobody can control this run from outside"));
         None
@@ -54,6 +56,8 @@ pub(super) fn start(ready: &Ready, control: &Control) -> Option<Serving> {
         decides: decider.is_some(),
         plan: ready.plan.clone(),
         registry: ready.registry.clone(),
+        asked: asked.clone(),
+        clock,
     };
     let server = match Server::start(&folder, &ready.plan.name, control.clone(), Arc::new(hooks)) {
         Ok(server) => server,
@@ -126,6 +130,8 @@ struct RunHooks {
     /// The plan that was run, for what the runtime does not know.
     plan: Plan,
     registry: Registry,
+    asked: Asked,
+    clock: ClockChoice,
 }
 
 /// What a run answers besides what every system does.
@@ -156,8 +162,15 @@ impl RunHooks {
 }
 
 impl Hooks for RunHooks {
-    fn stop(&self, _: &str) -> Result<(), Refusal> {
+    fn asks(&self, request: &Request) {
+        self.asked.asks(request);
+    }
+
+    fn stop(&self, why: &str) -> Result<(), Refusal> {
         self.robots()?;
+        if self.clock == ClockChoice::Sim {
+            return self.asked.act(Deed::Stop(why.to_owned()));
+        }
         // First stop, then look at the clock: asking for the time can wait for a step.
         self.latches.iter().for_each(|latch| latch.set(Cause::Person, Time::ZERO));
         Ok(())
@@ -165,6 +178,9 @@ impl Hooks for RunHooks {
 
     fn reset(&self) -> Result<(), Refusal> {
         self.robots()?;
+        if self.clock == ClockChoice::Sim {
+            return self.asked.act(Deed::Reset);
+        }
         let now = self.now();
         self.latches.iter().for_each(|latch| {
             latch.reset(now);

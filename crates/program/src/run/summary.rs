@@ -7,6 +7,7 @@ use runtime::{AgentView, CannotRun, Figure, Incident, Report, SystemView};
 use serde_json::{Value as Json, json};
 use types::{Duration, Time};
 
+use super::asked::{self, Asked};
 use super::judge;
 use super::prepare::Ready;
 use super::recorder::LogOutcome;
@@ -27,6 +28,17 @@ pub(crate) struct RobotOutcome {
     /// Whether its commands went nowhere, because it is a recording.
     pub(crate) shadow: bool,
     pub(crate) report: Option<hardware::Report>,
+}
+
+/// What became of a repeated run.
+#[derive(Clone, Debug)]
+pub(crate) struct Repeated {
+    /// The log of the run before.
+    pub(crate) log: PathBuf,
+    /// How often something was asked in it.
+    pub(crate) requests: usize,
+    /// Where this run differs; nothing when the bytes are the same.
+    pub(crate) differs: Option<String>,
 }
 
 /// What a run comes to.
@@ -57,6 +69,7 @@ pub(crate) struct Summary {
     /// Pictures a second that were to be kept.
     pub(crate) images: f64,
     pub(crate) files: Vec<PathBuf>,
+    pub(crate) repeat: Option<Repeated>,
 }
 
 impl Summary {
@@ -110,12 +123,24 @@ impl Summary {
             log: None,
             images: 0.0,
             files: Vec::new(),
+            repeat: None,
         }
     }
 
-    /// Whether the run did what it was to do: met its goal, or without one ran to its end.
+    /// Says of the requests of a repeated log that the plan did not ask for them.
+    pub(crate) fn repeats(&mut self, asked: &Asked) {
+        let timed = self.incidents.iter_mut().filter(|incident| incident.agent == asked::PLAN);
+        for (number, incident) in timed.enumerate() {
+            if asked.is_repeated(number) {
+                incident.agent = asked::LOG.into();
+            }
+        }
+    }
+
+    /// Whether the run did what it was to do: met its goal, or without one ran to its end; a repeated one gave the same bytes.
     pub(crate) fn is_success(&self) -> bool {
-        self.met.unwrap_or(self.ended != judge::INTERRUPTED)
+        let same = self.repeat.as_ref().is_none_or(|repeat| repeat.differs.is_none());
+        self.met.unwrap_or(self.ended != judge::INTERRUPTED) && same
     }
 
     fn truths(&self) -> impl Iterator<Item = &sim::Truth> {
@@ -186,6 +211,12 @@ impl Summary {
                 "errors": log.errors,
             })),
             "files": self.files.iter().map(|file| file.display().to_string()).collect::<Vec<_>>(),
+            "repeat": self.repeat.as_ref().map(|repeat| json!({
+                "log": repeat.log.display().to_string(),
+                "requests": repeat.requests,
+                "same": repeat.differs.is_none(),
+                "differs": repeat.differs,
+            })),
         })
     }
 
@@ -235,6 +266,16 @@ impl Summary {
             log.errors
                 .iter()
                 .for_each(|error| line(format!("  log          {}", paint(coloured, "1;31", error))));
+        }
+        if let Some(repeat) = &self.repeat {
+            let (asked, log) = (repeat.requests, repeat.log.display());
+            line(match &repeat.differs {
+                None => format!("  repeated     {log}, with {asked} requests: the same bytes"),
+                Some(how) => {
+                    let how = paint(coloured, "1;31", &format!("it differs: {how}"));
+                    format!("  repeated     {log}, with {asked} requests: {how}")
+                }
+            });
         }
         for (i, file) in self.files.iter().enumerate() {
             line(format!("  {:<12} {}", if i == 0 { "files" } else { "" }, file.display()));
@@ -360,9 +401,9 @@ fn allocations(view: &SystemView) -> Option<Vec<(String, u64)>> {
 /// An incident in a sentence.
 fn happened(incident: &Incident, at: &str) -> String {
     let Incident { agent, what, .. } = incident;
-    if agent == "plan" {
+    if agent == asked::PLAN || agent == asked::LOG {
         return format!(
-            "the plan {} at {at}",
+            "the {agent} {} at {at}",
             what.replacen("asked: ", "asked for \"", 1).replacen("; refused", "\"; refused", 1)
                 + if what.contains("; refused") { "" } else { "\"" }
         );
