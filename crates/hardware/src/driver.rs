@@ -52,6 +52,9 @@ pub trait Driver: Send {
 
     /// Turns the head. `head` is finite and within the robot's limits.
     fn turn_head(&mut self, permit: &Permit, now: Time, head: Head) -> Result<(), DriverError>;
+
+    /// Holds the head where it is: a stop is for everything that moves.
+    fn hold_head(&mut self, permit: &Permit, now: Time) -> Result<(), DriverError>;
 }
 
 /// Which readings somebody wants.

@@ -90,7 +90,7 @@ pub struct Cycle {
 /// A driver behind its gate. There is no other way to the driver.
 ///
 /// Per cycle: [`poll`](Gate::poll), then [`command`](Gate::command) for what has come, then [`apply`](Gate::apply). Nothing in it
-/// allocates, waits for a lock or reads a clock. A gate that is dropped stops the wheels first.
+/// allocates, waits for a lock or reads a clock. A gate that is dropped first stops what moves.
 pub struct Gate {
     driver: Box<dyn Driver>,
     guard: Option<Guard>,
@@ -99,6 +99,10 @@ pub struct Gate {
     pressed: u32,
     bumper_latches: bool,
     was_set: bool,
+    /// How often the latch had been reset when it was last looked at.
+    resets: u64,
+    /// When the latch was last found set. Nothing that was commanded up to then moves the head.
+    barrier: Option<Time>,
     was_cut: bool,
     last_seen: Time,
 }
@@ -112,6 +116,7 @@ impl Gate {
     /// The same for a driver whose type is not known.
     pub fn of(driver: Box<dyn Driver>, latch: Latch) -> Gate {
         let guard = driver.describe().limits.map(|limits: Limits| Guard::new(limits, Policy::default()));
+        let resets = latch.state().resets();
         Gate {
             driver,
             guard,
@@ -120,6 +125,8 @@ impl Gate {
             pressed: 0,
             bumper_latches: true,
             was_set: false,
+            resets,
+            barrier: None,
             was_cut: false,
             last_seen: Time::ZERO,
         }
@@ -195,13 +202,16 @@ impl Gate {
         }
     }
 
-    /// Turns the head, unless the latch is set, there is none, or the command is not finite.
+    /// Turns the head by a command that was made at `stamp`, unless the latch is set or was set after that, there is none, or the
+    /// command is not finite.
     ///
     /// # Errors
     /// When the hardware cannot be reached.
-    pub fn command_head(&mut self, now: Time, head: Head) -> Result<(), DriverError> {
+    pub fn command_head(&mut self, now: Time, stamp: Time, head: Head) -> Result<(), DriverError> {
         self.counts.commands.add();
-        if self.latch.is_set() {
+        let latch = self.latch.state();
+        let was_reset = latch.resets() != self.resets;
+        if latch.is_set() || was_reset || self.barrier.is_some_and(|barrier| stamp.min(now) <= barrier) {
             self.counts.latched.add();
             return Ok(());
         }
@@ -228,6 +238,9 @@ impl Gate {
         self.last_seen = now;
         self.counts.cycles.add();
         let latch = self.latch.state();
+        if latch.is_set() || latch.resets() != self.resets {
+            self.hold(now, latch.resets())?;
+        }
         let event = self.look_at_latch(latch.is_set());
         let Some(guard) = &mut self.guard else {
             let verdict = Verdict {
@@ -244,6 +257,19 @@ impl Gate {
             self.latch.set(Cause::Hardware, now);
         })?;
         Ok(Cycle { verdict, event })
+    }
+
+    /// What moves besides the wheels stands, too: once when the latch is found set, or to have been.
+    fn hold(&mut self, now: Time, resets: u64) -> Result<(), DriverError> {
+        let is_new = !self.was_set || resets != self.resets;
+        (self.barrier, self.resets) = (Some(now), resets);
+        if !is_new || self.driver.describe().head.is_none() {
+            return Ok(());
+        }
+        self.driver.hold_head(&Permit(()), now).inspect_err(|_| {
+            self.counts.failures.add();
+            self.latch.set(Cause::Hardware, now);
+        })
     }
 
     fn look_at_latch(&mut self, is_set: bool) -> Option<Event> {
@@ -281,5 +307,6 @@ impl Drop for Gate {
     fn drop(&mut self) {
         // Should this fail too, the robot's own watchdog is what is left.
         let _ = self.driver.drive(&Permit(()), self.last_seen, Twist::ZERO);
+        let _ = self.driver.hold_head(&Permit(()), self.last_seen);
     }
 }

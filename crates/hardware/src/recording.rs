@@ -141,6 +141,10 @@ impl Driver for Recorded {
     fn turn_head(&mut self, _: &Permit, _: Time, _: Head) -> Result<(), DriverError> {
         Ok(())
     }
+
+    fn hold_head(&mut self, _: &Permit, _: Time) -> Result<(), DriverError> {
+        Ok(())
+    }
 }
 
 #[cfg(test)]

@@ -288,4 +288,8 @@ impl Driver for Replayed {
     fn turn_head(&mut self, _: &Permit, _: Time, _: Head) -> Result<(), DriverError> {
         Ok(())
     }
+
+    fn hold_head(&mut self, _: &Permit, _: Time) -> Result<(), DriverError> {
+        Ok(())
+    }
 }

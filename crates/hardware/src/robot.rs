@@ -200,8 +200,9 @@ impl Agent for Robot {
             let header = command.header();
             gate.command(now, Authority::of(header.priority), header.stamp, *command);
         }
-        if let Some(head) = self.head_to.latest() {
-            gate.command_head(now, head).map_err(|error| Fault { what: error.what })?;
+        while let Some(command) = self.head_to.take() {
+            let stamp = command.header().stamp;
+            gate.command_head(now, stamp, *command).map_err(|error| Fault { what: error.what })?;
         }
         let cycle = gate.apply(now).map_err(|error| Fault { what: error.what })?;
         if let Some(event) = cycle.event {

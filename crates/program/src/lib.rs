@@ -24,6 +24,7 @@ mod log;
 pub mod new;
 mod run;
 pub mod schema;
+mod signals;
 mod terminal;
 mod tools;
 

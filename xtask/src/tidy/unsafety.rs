@@ -10,6 +10,7 @@ use super::tree::Tree;
 pub(crate) const ALLOWED: &[(&str, &str)] = &[
     ("benches/peers/src/machine.rs", "a call of the operating system"),
     ("crates/hardware/src/latch/page.rs", "the latch is a word in a mapped file"),
+    ("crates/program/src/signals.rs", "one thread takes the signals of the process"),
     ("crates/runtime/src/allocations.rs", "an allocator in front of another"),
     ("crates/runtime/src/context.rs", "what a thread owns is reached through a pointer to it"),
     (

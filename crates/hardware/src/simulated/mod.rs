@@ -326,4 +326,11 @@ impl Driver for Simulated {
         locked(&self.world).command_head(self.id, head.pan, head.tilt);
         Ok(())
     }
+
+    fn hold_head(&mut self, _: &Permit, _: Time) -> Result<(), DriverError> {
+        let mut world = locked(&self.world);
+        let head = world.simulator().head(self.id);
+        world.command_head(self.id, head.pan, head.tilt);
+        Ok(())
+    }
 }

@@ -29,6 +29,7 @@ use types::Duration;
 
 use crate::cli::{ClockChoice, RunArgs, Speed};
 use crate::error::Failure;
+use crate::signals::Signals;
 use crate::{figures, file, terminal};
 use asked::Repeat;
 
@@ -48,10 +49,12 @@ pub(crate) fn run(args: &RunArgs, registry: Registry, json: bool) -> Result<Exit
     if args.web.is_some() {
         terminal::tell("the web page is not there yet; the run goes on without it");
     }
+    // Before any thread is there that could take one.
+    let signals = Signals::take()
+        .map_err(|error| Failure::new(format!("signals cannot be handled: {error}")).code(1))?;
     let scenario = options::scenario(args, with_robots(registry))?;
-    let asked_to_end = on_signals()?;
     if let Some(range) = args.seeds {
-        return seeds::run(args, &scenario, range, &asked_to_end, json);
+        return seeds::run(args, &scenario, range, signals.asked_to_end(), json);
     }
     let name = &scenario.file.plan.name;
     let repeat = args.repeat.as_ref().map(|path| Repeat::read(path, name)).transpose()?;
@@ -63,6 +66,11 @@ pub(crate) fn run(args: &RunArgs, registry: Registry, json: bool) -> Result<Exit
             Failure::new("a run on the wall clock never happens twice").help("leave out --clock wall")
         );
     }
+    if clock == ClockChoice::Wall {
+        // In simulated time the judge stops them, at an instant that the log can tell.
+        signals.stop(ready.robots.iter().map(|robot| robot.latch.clone()).collect());
+    }
+    let asked_to_end = signals.asked_to_end().clone();
     let watched = !json && terminal::watched();
     let place = Place::of(args, name, seed)?;
     let whole =
@@ -80,18 +88,6 @@ pub(crate) fn run(args: &RunArgs, registry: Registry, json: bool) -> Result<Exit
 pub(crate) fn with_robots(mut registry: Registry) -> Registry {
     registry.extend([Berth::default().agent_type("robot")]);
     registry
-}
-
-/// A flag that the usual signals set. A second one ends the process at once.
-fn on_signals() -> Result<Arc<AtomicBool>, Failure> {
-    let asked = Arc::new(AtomicBool::new(false));
-    for signal in [signal_hook::consts::SIGINT, signal_hook::consts::SIGTERM] {
-        // In this order: the first signal finds the flag clear and sets it, the second finds it set.
-        signal_hook::flag::register_conditional_shutdown(signal, 130, asked.clone())
-            .and_then(|_| signal_hook::flag::register(signal, asked.clone()))
-            .map_err(|error| Failure::new(format!("signals cannot be handled: {error}")).code(1))?;
-    }
-    Ok(asked)
 }
 
 /// Where the files of a run go.
