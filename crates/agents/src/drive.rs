@@ -138,6 +138,48 @@ impl Agent for DriveBase {
     }
 }
 
+/// The wheels are told to turn (m/s), and do not (m/s).
+const TOLD: f64 = 0.05;
+const STILL: f64 = 0.01;
+/// After so long of that it is no lag of the motors: somebody stopped them, or nobody counts them any more.
+const UNANSWERED: Duration = Duration::millis(600);
+/// For so long it then stands, before it tries again, slowly (m/s).
+const PAUSE: Duration = Duration::secs(5);
+const TRY: f64 = 0.1;
+
+/// Whether the wheels do what they are told.
+#[derive(Clone, Copy, Debug, Default)]
+struct Answer {
+    /// Since when they do not.
+    told: Option<Time>,
+    /// When they were found not to.
+    broken: Option<Time>,
+}
+
+impl Answer {
+    /// How fast the robot may go now (m/s), after a command that the wheels answer, or do not, with `motion`.
+    fn allowed(&mut self, commanded: Twist, motion: Option<Twist>, now: Time) -> f64 {
+        let Some(motion) = motion else { return f64::INFINITY };
+        if motion.linear.abs() >= STILL {
+            *self = Answer::default();
+            return f64::INFINITY;
+        }
+        if commanded.linear.abs() < TOLD {
+            self.told = None;
+        } else if now - *self.told.get_or_insert(now) > UNANSWERED {
+            if self.broken.is_none() {
+                runtime::note!("the wheels are told to turn and do not: standing");
+            }
+            (self.broken, self.told) = (Some(now), None);
+        }
+        match self.broken {
+            None => f64::INFINITY,
+            Some(broken) if now - broken < PAUSE => 0.0,
+            Some(_) => TRY,
+        }
+    }
+}
+
 /// The longest time between two steps that the limits of acceleration are granted at once (s).
 const LONGEST_STEP: f64 = 0.1;
 
@@ -149,6 +191,7 @@ struct Hands {
     safety: Option<Dated<Safety>>,
     reflex: Option<Dated<Twist>>,
     motion: Option<Twist>,
+    answer: Answer,
     commanded: Twist,
     cuts: Cuts,
     last: Option<Time>,
@@ -160,10 +203,13 @@ impl Hands {
         let veto = self.veto(params, guarded, now);
         let mut wanted = self.wanted(params, &veto, now);
         let forward = if veto.forward { Forward::Allowed } else { Forward::Forbidden };
-        if wanted.linear > veto.linear_max {
+        let answered = self.answer.allowed(self.commanded, self.motion, now);
+        let fastest = veto.linear_max.min(answered);
+        if wanted.linear > fastest {
             // Slower on the same path.
-            wanted = motion::kinematics::scaled(wanted, veto.linear_max.max(0.0) / wanted.linear);
+            wanted = motion::kinematics::scaled(wanted, fastest.max(0.0) / wanted.linear);
         }
+        wanted.linear = wanted.linear.max(-answered);
         let limited = limit(&params.limits(), wanted, self.commanded, forward, dt);
         self.cuts = limited.cuts;
         self.commanded = match Dated::fresh(&self.reflex, now, params.reflex_hold) {

@@ -31,6 +31,7 @@ pub mod odometry;
 pub mod safety_monitor;
 mod shared;
 pub mod sonar;
+mod trust;
 pub mod wall_follower;
 
 pub use camera::Camera;

@@ -1,6 +1,7 @@
 //! The safety monitor: how fast is safe, whether the robot may move forward at all, and a way out of danger.
 //!
-//! It runs when ranges come, and once more when they stay away: then it is blind, and says so.
+//! It runs when ranges come, and once more when they stay away: then it is blind, and says so. What its sensors say that cannot be true
+//! blinds it as well.
 
 use motion::ring::Ring;
 use motion::safety::{Parameters, Verdict, Way, judge, judge_way};
@@ -12,6 +13,7 @@ use types::params::Params;
 use types::{Duration, Point, Pose, Time};
 
 use crate::shared::{Dated, echoes, ring};
+use crate::trust::{Doubt, Trust};
 
 /// What the robot is, and how careful it shall be.
 #[derive(Clone, Debug, Params)]
@@ -119,17 +121,21 @@ impl Agent for SafetyMonitor {
         if let Some(received) = self.raw.newest() {
             self.watch.raw = Some(Dated { value: *received, stamp: received.header().stamp });
         }
-        if let Some(odometry) = self.odometry.latest() {
-            self.watch.motion = odometry.twist;
-            self.watch.pose = Some(odometry.pose);
+        while let Some(odometry) = self.odometry.take() {
+            if self.watch.trust.hear(&odometry, odometry.header().stamp, step.now) {
+                self.watch.motion = odometry.twist;
+                self.watch.pose = Some(odometry.pose);
+            }
         }
+        self.watch.hear_again();
         if let Some(filtered) = &self.watch.filtered {
             self.watch.heard_at = self.odometry.at(filtered.stamp).map(|found| found.value().pose);
         }
         let was_blind = self.watch.blind;
+        let was_doubted = self.watch.doubt;
         let (safety, offer) = self.watch.judge(&self.params, step.now);
-        if safety.blind && !was_blind {
-            runtime::note!("blind: no ranges that can be trusted");
+        if safety.blind && !(was_blind && was_doubted == self.watch.doubt) {
+            note(self.watch.doubt);
         }
         self.watch.blind = safety.blind;
         self.safety.send(safety);
@@ -141,6 +147,16 @@ impl Agent for SafetyMonitor {
             step.wake_at(ranges.stamp + self.params.stale + Duration::nanos(1));
         }
         Ok(())
+    }
+}
+
+/// Says why it is blind.
+fn note(doubt: Option<Doubt>) {
+    match doubt {
+        None => runtime::note!("blind: no ranges that can be trusted"),
+        Some(Doubt::Silent) => runtime::note!("blind: nothing is heard of the wheels"),
+        Some(Doubt::Jumps) => runtime::note!("blind: the wheels tell of a motion that cannot be"),
+        Some(Doubt::Frozen) => runtime::note!("blind: the ranges stay the same while the robot moves"),
     }
 }
 
@@ -177,6 +193,8 @@ struct Watch {
     side: f64,
     /// Whether that was said already.
     blind: bool,
+    trust: Trust,
+    doubt: Option<Doubt>,
 }
 
 impl Default for Watch {
@@ -192,13 +210,25 @@ impl Default for Watch {
             mapped: None,
             side: 0.0,
             blind: false,
+            trust: Trust::default(),
+            doubt: None,
         }
     }
 }
 
 impl Watch {
+    fn hear_again(&mut self) {
+        for (which, heard) in [&self.raw, &self.filtered].into_iter().enumerate() {
+            if let Some(heard) = heard {
+                self.trust.ring(which, &heard.value, heard.stamp, self.pose);
+            }
+        }
+    }
+
     fn judge(&mut self, params: &SafetyParams, now: Time) -> (Safety, Option<Offer>) {
-        let Some(filtered) = Dated::fresh(&self.filtered, now, params.stale) else {
+        self.doubt = self.trust.doubt(now);
+        let heard = Dated::fresh(&self.filtered, now, params.stale).filter(|_| self.doubt.is_none());
+        let Some(filtered) = heard else {
             self.side = 0.0;
             return (Safety { danger: 1.0, blind: true, ..Safety::default() }, None);
         };

@@ -14,6 +14,7 @@ use types::params::Params;
 use types::{Sequence, Time, geometry::TAU};
 
 use crate::shared::{Before, blank};
+use crate::trust::can_be;
 
 /// How echoes are filtered and when a direction is risky.
 #[derive(Clone, Debug, Params)]
@@ -79,6 +80,8 @@ pub struct Sonar {
     risk: Output<Risk>,
     params: SonarParams,
     chain: Chain,
+    /// Whether the last ring could not be true.
+    doubted: bool,
 }
 
 impl Agent for Sonar {
@@ -86,6 +89,13 @@ impl Agent for Sonar {
         let Some(received) = self.echoes.newest() else { return Ok(()) };
         let stamp = received.header().stamp;
         let envelope = Envelope { stamp: Some(stamp), ..Envelope::default() };
+        if !can_be(&received) {
+            if !std::mem::replace(&mut self.doubted, true) {
+                runtime::note!("the ring of sonars says what cannot be; it is not listened to");
+            }
+            return Ok(());
+        }
+        self.doubted = false;
         let raw = around_centre(&received);
         if self.raw.has_listeners() {
             self.raw.send_as(envelope, raw);

@@ -1,0 +1,223 @@
+//! Whether what the sensors say can be true. What cannot is as good as nothing, and who hears nothing stands.
+//!
+//! | what is heard | why it cannot be true |
+//! |---|---|
+//! | a number that is none, or a place metres from the last | no wheels drive like that |
+//! | nothing from the wheels for some time | they were heard before |
+//! | the same echoes to the last digit, elsewhere | a sensor that moves hears something else, if only its noise |
+
+use types::messages::{Echoes, Odometry, Ranges};
+use types::{Duration, Pose, Time};
+
+use crate::shared::{Dated, echoes};
+
+/// Why the robot's own senses are not believed.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Doubt {
+    /// Odometry has fallen silent.
+    Silent,
+    /// Odometry tells of motions that nothing on wheels can make.
+    Jumps,
+    /// The ranges stay the same while the robot moves.
+    Frozen,
+}
+
+/// Odometry that is older than this has fallen silent. 300 ms is fifteen readings of wheels at 50 Hz.
+const SILENT: Duration = Duration::millis(300);
+/// For so long after a jump it is not believed: two readings of a sonar at 4 Hz must have been made after it.
+const DOUBTED: Duration = Duration::millis(600);
+/// Nothing that these agents drive is faster than this (m/s, rad/s).
+const FASTEST: (f64, f64) = (20.0, 20.0);
+/// How far a place may be from where the velocity leads (m): slip, and the noise of the wheels.
+const SLIP: f64 = 0.1;
+/// Farther than this (m, rad) from where they were heard first, the same echoes cannot be true.
+const ELSEWHERE: (f64, f64) = (0.06, 0.1);
+/// Fewer echoes than this can be the same by chance.
+const ECHOES: usize = 3;
+
+/// What is believed of odometry and of two rings of ranges.
+#[derive(Clone, Copy, Debug, Default)]
+pub(crate) struct Trust {
+    odometry: Option<Dated<Odometry>>,
+    /// When it last told of what cannot be.
+    jumped: Option<Time>,
+    rings: [Again; 2],
+}
+
+/// A ring that may be heard again.
+#[derive(Clone, Copy, Debug, Default)]
+struct Again {
+    stamp: Option<Time>,
+    values: u64,
+    /// Where it was heard first.
+    place: Option<Pose>,
+    frozen: bool,
+}
+
+impl Trust {
+    /// Hears odometry; whether it can be true.
+    pub(crate) fn hear(&mut self, odometry: &Odometry, stamp: Time, now: Time) -> bool {
+        let before = self.odometry.replace(Dated { value: *odometry, stamp });
+        let twist = odometry.twist;
+        let is_possible = is_finite(odometry.pose)
+            && twist.linear.abs() <= FASTEST.0
+            && twist.angular.abs() <= FASTEST.1
+            && before.is_none_or(|before| leads(&before, odometry, stamp));
+        if !is_possible {
+            self.jumped = Some(now);
+        }
+        is_possible
+    }
+
+    /// Hears one of two rings, from where the robot is.
+    pub(crate) fn ring(&mut self, which: usize, ranges: &Ranges, stamp: Time, place: Option<Pose>) {
+        let again = &mut self.rings[which];
+        if again.stamp.replace(stamp) == Some(stamp) {
+            return;
+        }
+        let values = digest(ranges);
+        if values != again.values || echoes(ranges).count() < ECHOES {
+            *again = Again { stamp: Some(stamp), values, place, frozen: false };
+        } else if let (Some(here), Some(there)) = (place, again.place) {
+            let far = (here.position() - there.position()).norm() > ELSEWHERE.0;
+            let turned = types::geometry::wrap(here.heading - there.heading).abs() > ELSEWHERE.1;
+            again.frozen |= far || turned;
+        }
+    }
+
+    /// What cannot be believed now.
+    pub(crate) fn doubt(&self, now: Time) -> Option<Doubt> {
+        if self.jumped.is_some_and(|jumped| now - jumped <= DOUBTED) {
+            Some(Doubt::Jumps)
+        } else if self.odometry.as_ref().is_some_and(|heard| now - heard.stamp > SILENT) {
+            Some(Doubt::Silent)
+        } else {
+            self.rings.iter().any(|ring| ring.frozen).then_some(Doubt::Frozen)
+        }
+    }
+}
+
+/// Whether the place follows from the one before at either velocity.
+fn leads(before: &Dated<Odometry>, after: &Odometry, stamp: Time) -> bool {
+    let span = (stamp - before.stamp).seconds().max(0.0);
+    let speed = before.value.twist.linear.abs().max(after.twist.linear.abs());
+    let way = (after.pose.position() - before.value.pose.position()).norm();
+    // A robot that speeds up drives farther than at the speed of before: twice as far is farther than any can.
+    way <= SLIP + 2.0 * speed * span
+}
+
+fn is_finite(pose: Pose) -> bool {
+    pose.x.is_finite() && pose.y.is_finite() && pose.heading.is_finite()
+}
+
+/// A number that differs where values differ (FNV-1a).
+fn digest(ranges: &Ranges) -> u64 {
+    let step = |sum: u64, value: &f32| (sum ^ u64::from(value.to_bits())).wrapping_mul(0x0100_0000_01b3);
+    ranges.values.iter().fold(0xcbf2_9ce4_8422_2325, step)
+}
+
+/// No transducer sits farther from the middle of its robot than this (m).
+const FARTHEST_MOUNT: f64 = 10.0;
+/// So much more than its longest range a transducer may tell, for rounding.
+const ROUNDING: f32 = 1.01;
+
+/// Whether a ring of sonars can be one: where its transducers sit, and what they heard. One that heard nothing can.
+pub(crate) fn can_be(ring: &Echoes) -> bool {
+    let (least, most) = (ring.range_min, ring.range_max);
+    let sits = |x: f32| f64::from(x).abs() <= FARTHEST_MOUNT;
+    let hears = |range: f32| !(range < 0.0 || range.is_finite() && range > most * ROUNDING);
+    // Written so that what is no number fails.
+    (0.0..most).contains(&least)
+        && most.is_finite()
+        && (0.0..=7.0).contains(&ring.cone)
+        && ring
+            .echoes
+            .iter()
+            .all(|echo| sits(echo.x) && sits(echo.y) && sits(echo.bearing) && hears(echo.range))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::shared::blank;
+    use types::messages::{Echo, Twist};
+
+    fn at(x: f64, speed: f64) -> Odometry {
+        Odometry { pose: Pose::new(x, 0.0, 0.0), twist: Twist::new(speed, 0.0), ..Odometry::default() }
+    }
+
+    fn ms(ms: i64) -> Time {
+        Time(ms * 1_000_000)
+    }
+
+    #[test]
+    fn a_drive_is_believed_and_what_no_wheels_do_is_not() {
+        let mut trust = Trust::default();
+        for i in 0..50 {
+            assert!(trust.hear(&at(0.01 * i as f64, 0.5), ms(20 * i), ms(20 * i)));
+        }
+        assert_eq!(trust.doubt(ms(1000)), None);
+        assert!(!trust.hear(&at(3.0, 0.5), ms(1000), ms(1000)), "two metres and a half in 20 ms");
+        assert_eq!(trust.doubt(ms(1010)), Some(Doubt::Jumps));
+        for i in 1..50 {
+            assert!(trust.hear(&at(3.0, 0.0), ms(1000 + 20 * i), ms(1000 + 20 * i)));
+        }
+        assert_eq!(trust.doubt(ms(1980)), None, "it is believed again after a while");
+        for wild in [at(f64::NAN, 0.0), at(0.0, f64::INFINITY), at(3.0, -1e6)] {
+            assert!(!trust.hear(&wild, ms(2000), ms(2000)), "{wild:?}");
+        }
+    }
+
+    #[test]
+    fn who_was_heard_once_must_not_fall_silent() {
+        let mut trust = Trust::default();
+        assert_eq!(trust.doubt(ms(9000)), None, "without odometry nothing is amiss");
+        trust.hear(&at(0.0, 0.0), ms(9000), ms(9000));
+        assert_eq!((trust.doubt(ms(9300)), trust.doubt(ms(9301))), (None, Some(Doubt::Silent)));
+    }
+
+    #[test]
+    fn the_same_echoes_elsewhere_are_not_believed() {
+        let mut trust = Trust::default();
+        let mut ranges = blank(12, 0.3, 6.2);
+        ranges.values.fill(6.2);
+        ranges.values[3] = 1.0;
+        let here = |x: f64| Some(Pose::new(x, 0.0, 0.0));
+        for i in 0..9 {
+            trust.ring(0, &ranges, ms(250 * i), here(0.1 * i as f64));
+        }
+        assert_eq!(trust.doubt(ms(2250)), None, "one echo may be the same by chance, and silence always is");
+        ranges.values[4..7].fill(2.0);
+        trust.ring(0, &ranges, ms(2500), here(1.0));
+        trust.ring(0, &ranges, ms(2500), here(2.0));
+        assert_eq!(trust.doubt(ms(2500)), None, "that was one reading, looked at twice");
+        trust.ring(0, &ranges, ms(2750), here(1.05));
+        assert_eq!(trust.doubt(ms(2750)), None, "at rest, or nearly, it may hear the same");
+        trust.ring(0, &ranges, ms(3000), here(1.07));
+        assert_eq!(trust.doubt(ms(3000)), Some(Doubt::Frozen));
+        trust.ring(0, &ranges, ms(3250), here(1.07));
+        assert_eq!(trust.doubt(ms(3250)), Some(Doubt::Frozen), "that it stands now makes it no better");
+        ranges.values[4] = 2.001;
+        trust.ring(0, &ranges, ms(3500), here(1.07));
+        assert_eq!(trust.doubt(ms(3500)), None);
+    }
+
+    #[test]
+    fn a_ring_out_of_nowhere_is_none() {
+        let echo = Echo { x: 0.2, y: 0.0, bearing: 0.5, range: 1.0 };
+        let good =
+            Echoes { range_min: 0.15, range_max: 6.0, cone: 0.5, echoes: [echo; 4].into_iter().collect() };
+        assert!(can_be(&good));
+        let silent = |range| Echoes { echoes: [Echo { range, ..echo }; 4].into_iter().collect(), ..good };
+        assert!([f32::NAN, f32::INFINITY, 6.0].map(silent).iter().all(can_be), "it heard nothing");
+        assert!(![-1.0, 7.0].map(silent).iter().any(can_be));
+        let wild = [
+            Echoes { range_max: f32::INFINITY, ..good },
+            Echoes { range_min: f32::NAN, ..good },
+            Echoes { cone: -3.0, ..good },
+            Echoes { echoes: [Echo { bearing: f32::NAN, ..echo }; 4].into_iter().collect(), ..good },
+            Echoes { echoes: [Echo { x: 1e5, ..echo }; 4].into_iter().collect(), ..good },
+        ];
+        assert!(!wild.iter().any(can_be));
+    }
+}
