@@ -34,7 +34,9 @@ Usage: cargo xtask COMMAND
   peers                builds other systems, for `sinew bench` to measure beside ours
 
 Environment: SINEW_DATA, the folder with recordings of real robots (default ../shared/data);
-SINEW_FUZZ_SECONDS, how long each target of the step fuzz runs (default 10).";
+SINEW_FUZZ_SECONDS, how long each target of the step fuzz runs (default 10);
+SINEW_FAULTS, which sample of the faults the step faults tries (default 0), or \"all\";
+SINEW_PROGRAM, a program that the steps take in place of a release build.";
 
 fn main() -> ExitCode {
     let words: Vec<String> = std::env::args().skip(1).collect();

@@ -4,8 +4,8 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 
 use motion::limits::{Cuts, Limits};
-use types::Time;
 use types::messages::{Head, Twist};
+use types::{Duration, Time};
 
 use crate::description::RobotDescription;
 use crate::driver::{Driver, DriverError, Listening, Polled, Sink};
@@ -78,6 +78,28 @@ pub enum Event {
     Clamped(Cuts),
 }
 
+/// So many commands that are no numbers, within so long, come from somebody who is broken: what else they command is as wrong, though
+/// it looks right. One alone may be a division by zero at an odd moment, for which standing still is enough.
+const NONSENSE: (u32, Duration) = (3, Duration::secs(1));
+
+/// Counts nonsense.
+#[derive(Clone, Copy, Debug, Default)]
+struct Nonsense {
+    count: u32,
+    since: Option<Time>,
+}
+
+impl Nonsense {
+    /// Counts one; whether it was one too many.
+    fn count(&mut self, now: Time) -> bool {
+        if self.since.is_none_or(|since| now - since > NONSENSE.1) {
+            *self = Nonsense { count: 0, since: Some(now) };
+        }
+        self.count += 1;
+        self.count >= NONSENSE.0
+    }
+}
+
 /// What one cycle did.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Cycle {
@@ -104,6 +126,7 @@ pub struct Gate {
     /// When the latch was last found set. Nothing that was commanded up to then moves the head.
     barrier: Option<Time>,
     was_cut: bool,
+    nonsense: Nonsense,
     last_seen: Time,
 }
 
@@ -128,6 +151,7 @@ impl Gate {
             resets,
             barrier: None,
             was_cut: false,
+            nonsense: Nonsense::default(),
             last_seen: Time::ZERO,
         }
     }
@@ -188,7 +212,7 @@ impl Gate {
         }
     }
 
-    /// Takes a command that was made at `stamp`. What does not pass is counted.
+    /// Takes a command that was made at `stamp`. What does not pass is counted; the third within a second that is no number sets the latch.
     pub fn command(&mut self, now: Time, authority: Authority, stamp: Time, twist: Twist) {
         let counts = &self.counts;
         counts.commands.add();
@@ -196,7 +220,12 @@ impl Gate {
         match guard.offer(now, self.latch.state(), authority, stamp, twist) {
             Ok(()) if guard.is_overruled(authority) => counts.overruled.add(),
             Ok(()) => {}
-            Err(Refusal::NotFinite) => counts.not_finite.add(),
+            Err(Refusal::NotFinite) => {
+                counts.not_finite.add();
+                if self.nonsense.count(now) {
+                    self.latch.set(Cause::Nonsense, now);
+                }
+            }
             Err(Refusal::Latched | Refusal::BeforeReset) => counts.latched.add(),
             Err(Refusal::Stale) => counts.stale.add(),
         }
@@ -308,5 +337,19 @@ impl Drop for Gate {
         // Should this fail too, the robot's own watchdog is what is left.
         let _ = self.driver.drive(&Permit(()), self.last_seen, Twist::ZERO);
         let _ = self.driver.hold_head(&Permit(()), self.last_seen);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn nonsense_now_and_then_is_borne_and_again_and_again_it_is_not() {
+        let ms = |ms: i64| Time(ms * 1_000_000);
+        let mut nonsense = Nonsense::default();
+        assert!((0..20).all(|i| !nonsense.count(ms(600 * i))));
+        let mut nonsense = Nonsense::default();
+        assert_eq!([0, 400, 1000].map(|at| nonsense.count(ms(at))), [false, false, true]);
     }
 }

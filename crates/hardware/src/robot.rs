@@ -260,6 +260,7 @@ fn note_set(state: LatchState) {
             Cause::Watchdog => runtime::note!("the latch is set: a step did not come back"),
             Cause::Supervisor => runtime::note!("the latch is set: the supervisor gave up an agent"),
             Cause::Hardware => runtime::note!("the latch is set: the hardware failed"),
+            Cause::Nonsense => runtime::note!("the latch is set: commands again and again were no numbers"),
         }
     }
 }

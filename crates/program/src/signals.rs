@@ -40,6 +40,9 @@ impl Signals {
         if !is_ignored(libc::SIGHUP) {
             wanted.push(libc::SIGHUP);
         }
+        // A file that may not grow any more is an error of the write, as on a full disk, and no reason to leave a robot alone.
+        // SAFETY: no handler is given, only that the signal be ignored.
+        let _ = unsafe { libc::signal(libc::SIGXFSZ, libc::SIG_IGN) };
         let set = set_of(&wanted);
         // SAFETY: the set is initialised, and nobody asks for the mask of before.
         let refused = unsafe { libc::pthread_sigmask(libc::SIG_BLOCK, &raw const set, std::ptr::null_mut()) };

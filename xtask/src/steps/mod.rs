@@ -1,7 +1,9 @@
 //! `cargo xtask test`: everything that must hold, step by step.
 
 mod cargo;
+mod faults;
 mod fuzz;
+mod hardship;
 mod lessons;
 mod live;
 mod log;
@@ -38,7 +40,7 @@ pub(crate) struct Step {
 }
 
 /// In the order in which mistakes are cheapest to find.
-pub(crate) const ALL: [Step; 13] = [
+pub(crate) const ALL: [Step; 15] = [
     Step {
         name: "format",
         shows: "every file is as rustfmt writes it",
@@ -98,6 +100,18 @@ pub(crate) const ALL: [Step; 13] = [
         shows: "the same plan, seed and requests give the same bytes",
         needs: &[Need::Compiler],
         run: repeat::run,
+    },
+    Step {
+        name: "faults",
+        shows: "faults of sensors and agents lead to no collision",
+        needs: &[Need::Compiler],
+        run: faults::run,
+    },
+    Step {
+        name: "hardship",
+        shows: "a full disk, a closed terminal and rude clients do not reach the robot",
+        needs: &[Need::Compiler],
+        run: hardship::run,
     },
     Step {
         name: "recorded",

@@ -54,11 +54,13 @@ pub enum Cause {
     Supervisor = 6,
     /// The hardware reported a fault.
     Hardware = 7,
+    /// Commands again and again held what is no number: who makes them is broken.
+    Nonsense = 8,
 }
 
 impl Cause {
     /// All causes.
-    pub const ALL: [Cause; 8] = [
+    pub const ALL: [Cause; 9] = [
         Cause::Bumper,
         Cause::Safety,
         Cause::Person,
@@ -67,6 +69,7 @@ impl Cause {
         Cause::Watchdog,
         Cause::Supervisor,
         Cause::Hardware,
+        Cause::Nonsense,
     ];
 
     /// Its name on the screen.
@@ -80,6 +83,7 @@ impl Cause {
             Cause::Watchdog => "watchdog",
             Cause::Supervisor => "supervisor",
             Cause::Hardware => "hardware",
+            Cause::Nonsense => "nonsense",
         }
     }
 

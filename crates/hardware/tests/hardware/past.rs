@@ -157,6 +157,24 @@ fn a_turning_head_stands_in_the_cycle_that_finds_the_latch_set() {
 }
 
 #[test]
+fn who_commands_nonsense_again_and_again_is_not_followed_any_more() {
+    let (mut gate, truth, latch) = raised();
+    let mut now = set_in_motion(&mut gate, Time::ZERO);
+    for cycle in 0..3 {
+        assert!(!latch.is_set(), "in cycle {cycle}");
+        gate.command(now, Authority::Robot, now, Twist::new(f64::NAN, 0.0));
+        gate.command(now, Authority::Robot, now, Twist::new(0.3, 0.0));
+        now = cycles(&mut gate, now, 1);
+    }
+    assert!(latch.state().has(Cause::Nonsense));
+    now = cycles(&mut gate, now, 300);
+    let at_rest = moved(&truth);
+    gate.command(now, Authority::Robot, now, Twist::new(0.3, 0.0));
+    cycles(&mut gate, now, 100);
+    assert!(moved(&truth).is(at_rest));
+}
+
+#[test]
 fn a_gate_that_is_dropped_leaves_nothing_in_motion() {
     let robot = Body { name: "h1".into(), model: Model::h1(), start: Pose::new(4.0, 3.0, 0.3), goal: None };
     let other = Body { name: "h2".into(), model: Model::h1(), start: Pose::new(1.0, 1.0, 0.3), goal: None };
