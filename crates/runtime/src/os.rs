@@ -4,7 +4,7 @@
 
 #[cfg(not(loom))]
 use core::sync::atomic::AtomicU32;
-use core::sync::atomic::{AtomicI32, Ordering};
+use core::sync::atomic::{AtomicI32, AtomicU8, Ordering};
 use std::io;
 
 /// Waits while `word` is `expected`, until it is woken or `until` (monotonic clock, nanoseconds) has come.
@@ -180,18 +180,41 @@ pub(crate) fn barrier_everywhere() {
     let _ = membarrier(BARRIER.load(Ordering::Relaxed));
 }
 
-/// The time stamp counter where there is one, else the monotonic clock: a reading for differences, cheap enough for every step.
+/// The time stamp counter where it goes at one rate on all processors, else the monotonic clock: cheap enough for every step.
 #[inline(always)]
 pub(crate) fn ticks() -> u64 {
     #[cfg(target_arch = "x86_64")]
-    // SAFETY: every x86-64 processor has the instruction.
-    unsafe {
-        core::arch::x86_64::_rdtsc()
-    }
-    #[cfg(not(target_arch = "x86_64"))]
     {
-        monotonic() as u64
+        static STEADY: AtomicU8 = AtomicU8::new(UNKNOWN);
+        const UNKNOWN: u8 = 0;
+        const NO: u8 = 1;
+        const YES: u8 = 2;
+        #[cold]
+        fn find_out() -> u8 {
+            let found = if is_steady() { YES } else { NO };
+            STEADY.store(found, Ordering::Relaxed);
+            found
+        }
+        let mut steady = STEADY.load(Ordering::Relaxed);
+        if steady == UNKNOWN {
+            steady = find_out();
+        }
+        if steady == YES {
+            // SAFETY: every x86-64 processor has the instruction.
+            return unsafe { core::arch::x86_64::_rdtsc() };
+        }
     }
+    monotonic() as u64
+}
+
+/// Whether the processor says of its time stamp counter that it neither stops nor changes its rate. Some virtual machines keep that to
+/// themselves; there the clock of the system is read, which costs more and is right.
+#[cfg(target_arch = "x86_64")]
+fn is_steady() -> bool {
+    use core::arch::x86_64::__cpuid;
+    const POWER: u32 = 0x8000_0007;
+    const INVARIANT_TSC: u32 = 1 << 8;
+    __cpuid(0x8000_0000).eax >= POWER && __cpuid(POWER).edx & INVARIANT_TSC != 0
 }
 
 /// The monotonic clock (ns) and [`ticks`] at one instant: the first try in which nothing happened between, or the best of a few.
@@ -216,9 +239,6 @@ pub(crate) fn monotonic_and_ticks() -> (i64, u64) {
 pub(crate) fn nanos_per_tick() -> f64 {
     static RATE: std::sync::OnceLock<f64> = std::sync::OnceLock::new();
     *RATE.get_or_init(|| {
-        if cfg!(not(target_arch = "x86_64")) {
-            return 1.0;
-        }
         let (begin, begun) = monotonic_and_ticks();
         while monotonic() - begin < 2_000_000 {
             core::hint::spin_loop();
