@@ -21,6 +21,7 @@ mod spin;
 mod threads;
 mod turns;
 mod wake;
+mod watch;
 
 use std::path::PathBuf;
 use std::process::ExitCode;
@@ -85,6 +86,12 @@ const BENCHES: &[Bench] = &[
         what: "adding an agent to a live system of 1000 and removing it; up to 10 000 agents at 10 Hz in simulated time",
         goal: "a change in less than 1 ms whatever is wired elsewhere; a step as long among 10 000 as among 1000, and 20 times real time",
         measure: grow::measure,
+    },
+    Bench {
+        name: "watch",
+        what: "what a log, top, a tap and changes take of a processor while a robot drives on the wall clock",
+        goal: "less than 3 % of a processor, and nothing on threads in real time",
+        measure: watch::measure,
     },
 ];
 

@@ -124,6 +124,10 @@ impl Driver for Board {
     fn turn_head(&mut self, _: &Permit, _: Time, _: Head) -> Result<(), DriverError> {
         Ok(())
     }
+
+    fn hold_head(&mut self, _: &Permit, _: Time) -> Result<(), DriverError> {
+        Ok(())
+    }
 }
 
 /// Wishes to drive straight on, for ever.

@@ -37,6 +37,7 @@ pub(crate) use asked::Asked;
 pub(crate) use judge::{Facts, Judge, WORLD};
 pub(crate) use prepare::{ROBOT_KIND, Ready, Scenario};
 pub(crate) use recorder::{LogFile, choice};
+pub(crate) use serve::start as serve;
 pub(crate) use summary::{Summary, failure, span, table};
 
 /// How long a simulated system without a goal runs when nobody says: long enough to see what it does.

@@ -25,7 +25,7 @@ use crate::cli::ClockChoice;
 use crate::terminal;
 
 /// The control interface of a run, while it lasts.
-pub(super) struct Serving {
+pub(crate) struct Serving {
     _server: Server,
     over: Arc<AtomicBool>,
     listener: Option<JoinHandle<()>>,
@@ -37,7 +37,7 @@ const KEPT: usize = 256;
 const FETCH: HostDuration = HostDuration::from_millis(10);
 
 /// Opens the control interface. A run without it is still a run, so what goes wrong is told and no more.
-pub(super) fn start(ready: &Ready, control: &Control, asked: &Asked, clock: ClockChoice) -> Option<Serving> {
+pub(crate) fn start(ready: &Ready, control: &Control, asked: &Asked, clock: ClockChoice) -> Option<Serving> {
     let warn = |text: String| {
         terminal::tell(&format!("warning: {text}; nobody can control this run from outside"));
         None
