@@ -1,9 +1,10 @@
 //! What the agents of the measurements share: the message, the clock, a place for what was measured.
 
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, PoisonError};
 use std::thread::JoinHandle;
 
-use runtime::{Live, Options, Plan, Registry, Report};
+use runtime::{Incident, Live, Observer, Options, Plan, Registry, Report, Verdict};
 use rustix::thread::{CpuSet, sched_setaffinity};
 use rustix::time::{ClockId, clock_gettime};
 use types::{Duration, Message, Time};
@@ -56,15 +57,34 @@ pub(super) fn process_time() -> u64 {
 
 /// Where an agent puts what it measured, when it is stopped: in its steps it fills room of its own.
 #[derive(Clone, Debug, Default)]
-pub(super) struct Shelf(Arc<Mutex<Vec<f64>>>);
+pub(super) struct Shelf {
+    values: Arc<Mutex<Vec<f64>>>,
+    /// Whether somebody has measured all that there is room for.
+    over: Arc<AtomicBool>,
+}
 
 impl Shelf {
     pub(super) fn put(&self, values: &[f64]) {
-        self.0.lock().unwrap_or_else(PoisonError::into_inner).extend_from_slice(values);
+        self.values.lock().unwrap_or_else(PoisonError::into_inner).extend_from_slice(values);
     }
 
     pub(super) fn take(&self) -> Vec<f64> {
-        std::mem::take(&mut *self.0.lock().unwrap_or_else(PoisonError::into_inner))
+        std::mem::take(&mut *self.values.lock().unwrap_or_else(PoisonError::into_inner))
+    }
+}
+
+impl Shelf {
+    /// Adds a value to those of an agent. When its room is full the run is over.
+    pub(super) fn keep(&self, values: &mut Vec<f64>, value: f64) {
+        keep(values, value);
+        if values.len() == values.capacity() {
+            self.over.store(true, Ordering::Release);
+        }
+    }
+
+    /// Options of a run that ends when somebody's room is full, which should take `length`.
+    pub(super) fn until_full(&self, length: Duration) -> Options {
+        until(&self.over, length)
     }
 }
 
@@ -121,7 +141,23 @@ pub(super) fn run(live: Live, outcome: &mut Outcome) -> Result<Report, Failure> 
     Ok(report)
 }
 
-/// Options that end a run after so long.
-pub(super) fn for_so_long(limit: Duration) -> Options {
-    Options { limit: Some(limit), ..Options::default() }
+/// Ends a run when somebody in it has done all.
+struct Finish(Arc<AtomicBool>);
+
+impl Observer for Finish {
+    fn every(&self) -> Duration {
+        Duration::millis(1)
+    }
+    fn observe(&mut self, _: Time, _: &[Incident]) -> Verdict {
+        if self.0.load(Ordering::Acquire) {
+            return Verdict::End("all is done".into());
+        }
+        Verdict::GoOn
+    }
+}
+
+/// Options of a run that ends when all is done. What should take `length` is given up after three times as long and half a minute.
+pub(super) fn until(over: &Arc<AtomicBool>, length: Duration) -> Options {
+    let limit = Some(length * 3 + Duration::secs(30));
+    Options { limit, observer: Box::new(Finish(over.clone())), ..Options::default() }
 }

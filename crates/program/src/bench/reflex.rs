@@ -24,7 +24,7 @@ use types::{Duration, Sequence, Time};
 
 use super::Setting;
 use super::outcome::{Measured, Outcome};
-use super::parcel::{self, Parcel, Shelf, for_so_long, keep, live, now, room};
+use super::parcel::{self, Parcel, Shelf, live, now, room};
 use super::turns::Turns;
 use crate::error::Failure;
 
@@ -115,7 +115,8 @@ impl Driver for Board {
 
     fn drive(&mut self, _: &Permit, _: Time, twist: Twist) -> Result<(), DriverError> {
         if self.contact != 0 && twist.linear == 0.0 {
-            keep(&mut self.spans, now().saturating_sub(self.contact) as f64);
+            let span = now().saturating_sub(self.contact);
+            self.shelf.keep(&mut self.spans, span as f64);
             self.contact = 0;
         }
         Ok(())
@@ -175,7 +176,10 @@ fn robot(contacts: usize, outcome: &mut Outcome) -> Result<Vec<f64>, Failure> {
         plan.on(agent, input);
     }
     place(&mut plan, [("robot", 0), ("sonar", 1), ("safety", 2), ("coordinator", 2)]);
-    parcel::run(live(&plan, &registry, for_so_long(length(contacts)))?, outcome)?;
+    parcel::run(
+        live(&plan, &registry, shelf.until_full(CYCLE * (2 * contacts as i64 + WARM_UP as i64)))?,
+        outcome,
+    )?;
     // The board is dropped with its gate, and that with the types that know its berth.
     drop(registry);
     Ok(shelf.take())
@@ -191,11 +195,6 @@ fn place<const N: usize>(plan: &mut Plan, agents: [(&str, usize); N]) {
             agent.executor = Some(EXECUTORS[executor].0.into());
         }
     }
-}
-
-/// How long a round lasts.
-fn length(contacts: usize) -> Duration {
-    CYCLE * (2 * contacts as i64 + WARM_UP as i64) + Duration::millis(50)
 }
 
 /// Where the chain begins and ends when its agents do nothing.
@@ -216,7 +215,7 @@ impl Agent for Ends {
         if let Some(parcel) = self.back.take() {
             let span = now().saturating_sub(parcel.sent);
             if parcel.number > WARM_UP {
-                keep(&mut self.spans, span as f64);
+                self.shelf.keep(&mut self.spans, span as f64);
             }
         }
         if step.now >= self.next {
@@ -276,8 +275,8 @@ fn runtime_alone(contacts: usize, outcome: &mut Outcome) -> Result<Vec<f64>, Fai
         plan.on(name, "take");
     }
     place(&mut plan, [("ends", 0), ("sensor", 1), ("safety", 2), ("coordinator", 2)]);
-    let length = CYCLE * (contacts as i64 + WARM_UP as i64) + Duration::millis(50);
-    parcel::run(live(&plan, &registry, for_so_long(length))?, outcome)?;
+    let options = shelf.until_full(CYCLE * (contacts as i64 + WARM_UP as i64));
+    parcel::run(live(&plan, &registry, options)?, outcome)?;
     Ok(shelf.take())
 }
 

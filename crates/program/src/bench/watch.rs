@@ -191,14 +191,24 @@ fn shares(control: &Control, length: Duration) -> Result<Shares, Failure> {
 /// Watches until the run is over; gives how many answers came.
 type Watch = fn(Client, &AtomicBool) -> Result<u64, ClientError>;
 
+/// Whether the run ends now: whoever asks a system that has just ended is refused a little before that is known here.
+fn ends(over: &AtomicBool) -> bool {
+    for _ in 0..100 {
+        if over.load(Ordering::Acquire) {
+            return true;
+        }
+        pause(Pause::from_millis(20));
+    }
+    false
+}
+
 /// Asks again and again until the run is over.
 fn asks(mut client: Client, over: &AtomicBool, words: &[&str], every: Pause) -> Result<u64, ClientError> {
     let mut answers = 0;
     while !over.load(Ordering::Acquire) {
         match client.call(words) {
             Ok(_) => answers += 1,
-            // The run has ended meanwhile.
-            Err(ClientError::Ended) => break,
+            Err(_) if ends(over) => break,
             Err(error) => return Err(error),
         }
         pause(every);
@@ -223,7 +233,7 @@ fn taps(mut client: Client, over: &AtomicBool) -> Result<u64, ClientError> {
     while !over.load(Ordering::Acquire) {
         match client.next_event(Some(LOOK)) {
             Ok(event) => heard += u64::from(event.is_some()),
-            Err(ClientError::Ended) => break,
+            Err(_) if ends(over) => break,
             Err(error) => return Err(error),
         }
     }

@@ -6,11 +6,10 @@
 use runtime::{Agent, AgentType, Declare as _, Fault, Input, Output, Plan, Registry, Step};
 use types::{Duration, Message};
 
-use super::chain::Finish;
 use super::{CPU, recorded};
 use crate::bench::Setting;
 use crate::bench::outcome::Outcome;
-use crate::bench::parcel::{Shelf, process_time, thread_time};
+use crate::bench::parcel::{Shelf, process_time, thread_time, until};
 use crate::bench::turns::{Turns, mean};
 use crate::error::Failure;
 use std::hint::black_box;
@@ -132,11 +131,7 @@ fn run(iterations: usize, outcome: &mut Outcome) -> Result<([f64; 2], Option<Fai
         AgentType::of::<Segment>(),
         AgentType::of::<Foot>(),
     ]);
-    let options = runtime::Options {
-        limit: Some(PERIOD * (3 * iterations as i64) + Duration::secs(10)),
-        observer: Box::new(Finish(over)),
-        ..runtime::Options::default()
-    };
+    let options = until(&over, PERIOD * iterations as i64);
     let kept = recorded::run(&plan(), &registry, options, outcome)?;
     let &[thread, process] = &shelf.take()[..] else {
         return Err(Failure::new("the lights were not all sent in time").code(1));

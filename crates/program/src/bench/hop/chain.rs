@@ -3,13 +3,10 @@
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
-use runtime::{
-    Agent, AgentType, Declare as _, Fault, Incident, Input, Observer, Options, Output, Plan, Registry, Step,
-    Verdict,
-};
-use types::{Duration, Time};
+use runtime::{Agent, AgentType, Declare as _, Fault, Input, Options, Output, Plan, Registry, Step};
+use types::Duration;
 
-use crate::bench::parcel::{Parcel, Shelf, keep, now, process_time, room, thread_time};
+use crate::bench::parcel::{Parcel, Shelf, keep, now, process_time, room, thread_time, until};
 
 /// Messages before anything is kept.
 const WARM_UP: u64 = 100;
@@ -31,14 +28,9 @@ impl Trace {
         Trace { messages: messages as u64, ..Trace::default() }
     }
 
-    /// Options of a run that ends when all messages are sent. Paced messages take `period` each; what is not done after three
-    /// times as long and a while is given up.
+    /// Options of a run that ends when all messages are sent, at a period.
     pub(super) fn options(&self, period: Duration) -> Options {
-        Options {
-            limit: Some(period * (3 * self.messages as i64) + Duration::secs(10)),
-            observer: Box::new(Finish(self.over.clone())),
-            ..Options::default()
-        }
+        until(&self.over, period * self.messages as i64)
     }
 
     /// The agents.
@@ -55,21 +47,6 @@ impl Trace {
             })
             .named("sink"),
         ])
-    }
-}
-
-/// Ends the run when all messages are sent.
-pub(super) struct Finish(pub(super) Arc<AtomicBool>);
-
-impl Observer for Finish {
-    fn every(&self) -> Duration {
-        Duration::millis(1)
-    }
-    fn observe(&mut self, _: Time, _: &[Incident]) -> Verdict {
-        if self.0.load(Ordering::Acquire) {
-            return Verdict::End("all messages are sent".into());
-        }
-        Verdict::GoOn
     }
 }
 

@@ -16,10 +16,9 @@ use runtime::{
 use types::Duration;
 
 use super::CPU;
-use super::chain::Finish;
 use crate::bench::Setting;
 use crate::bench::outcome::Outcome;
-use crate::bench::parcel::{self, Parcel, Shelf, end, live, now, thread};
+use crate::bench::parcel::{self, Parcel, Shelf, end, live, now, thread, until};
 use crate::bench::turns::{Turns, mean};
 use crate::error::Failure;
 
@@ -49,8 +48,7 @@ impl Shared {
     }
 
     fn options(&self) -> Options {
-        let observer = Box::new(Finish(self.over.clone()));
-        Options { limit: Some(Duration::secs(60)), observer, ..Options::default() }
+        until(&self.over, Duration::secs(10))
     }
 
     /// Whoever sends has sent all; it took so long (ns).

@@ -9,16 +9,15 @@ use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::time::Duration as Pause;
 
 use runtime::{
-    Agent, AgentType, Control, Declare as _, Fault, Input, Options, Output, Plan, Registry, Request, Step,
-    WirePlan,
+    Agent, AgentType, Control, Declare as _, Fault, Input, Output, Plan, Registry, Request, Step, WirePlan,
 };
 use types::Duration;
 
 use super::CPU;
-use super::chain::{self, Finish, Hand, Trace};
+use super::chain::{self, Hand, Trace};
 use crate::bench::Setting;
 use crate::bench::outcome::Outcome;
-use crate::bench::parcel::{self, Parcel, Shelf, end, keep, live, now, room, thread};
+use crate::bench::parcel::{self, Parcel, Shelf, end, keep, live, now, room, thread, until};
 use crate::bench::turns::{Turns, mean};
 use crate::error::Failure;
 use crate::terminal::pause;
@@ -179,9 +178,7 @@ fn laps(iterations: usize, stamps: bool, outcome: &mut Outcome) -> Result<Ran, F
         })
         .named("finisher"),
     ]);
-    let observer = Box::new(Finish(over.clone()));
-    let options = Options { limit: Some(Duration::secs(60)), observer, ..Options::default() };
-    let live = live(&plan(), &registry, options)?;
+    let live = live(&plan(), &registry, until(&over, Duration::secs(10)))?;
     let control = live.control();
     let rewires = thread("bench-rewires", move || rewire(&control, &over))?;
     let ran = parcel::run(live, outcome);

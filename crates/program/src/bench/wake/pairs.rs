@@ -7,7 +7,7 @@ use types::Duration;
 use super::PRIORITY;
 use crate::bench::Setting;
 use crate::bench::outcome::{Outcome, median};
-use crate::bench::parcel::{self, Parcel, Shelf, for_so_long, keep, live, now, room};
+use crate::bench::parcel::{self, Parcel, Shelf, live, now, room};
 use crate::bench::turns::Turns;
 use crate::error::Failure;
 
@@ -49,7 +49,7 @@ impl Agent for Sink {
         while let Some(parcel) = self.take.take() {
             let span = now().saturating_sub(parcel.sent);
             if parcel.number > WARM_UP {
-                keep(&mut self.spans, span as f64);
+                self.shelf.keep(&mut self.spans, span as f64);
             }
         }
         Ok(())
@@ -120,8 +120,7 @@ fn system(cpus: (usize, usize), wakes: usize, outcome: &mut Outcome) -> Result<V
         })
         .named("sink"),
     ]);
-    // Somewhat longer than that, since the threads have to start.
-    let limit = PERIOD * (wakes as i64 + WARM_UP as i64) + Duration::millis(50);
-    parcel::run(live(&plan, &registry, for_so_long(limit))?, outcome)?;
+    let options = shelf.until_full(PERIOD * (wakes as i64 + WARM_UP as i64));
+    parcel::run(live(&plan, &registry, options)?, outcome)?;
     Ok(shelf.take())
 }
