@@ -17,9 +17,10 @@ use super::Setting;
 use super::outcome::Outcome;
 use super::parcel::{end, now, process_time, thread};
 use super::threads::{self, Used};
+use crate::cli::ClockChoice;
 use crate::error::Failure;
 use crate::file;
-use crate::run::{Facts, Judge, LogFile, Scenario, choice, failure, serve, with_robots};
+use crate::run::{Asked, Facts, Judge, LogFile, Scenario, choice, failure, serve, with_robots};
 use crate::terminal::pause;
 
 /// How long the robot drives in a round (s), and rounds.
@@ -89,12 +90,12 @@ fn drive(
     loaded.plan.name = format!("bench-watch-{}", std::process::id());
     let scenario = Scenario { file: loaded, registry };
     let ready = scenario.prepare(1)?;
-    let facts = Facts::default();
-    let recorder = if watched { Some(recorder(&facts)?) } else { None };
+    let (facts, asked) = (Facts::default(), Asked::default());
+    let recorder = if watched { Some(recorder(&facts, &asked)?) } else { None };
     let options = Options {
         limit: Some(length),
         log: if watched { choice(&ready, 0.0) } else { Default::default() },
-        observer: Box::new(Judge::new(&ready, Arc::default(), watched.then_some(facts))),
+        observer: Box::new(Judge::new(&ready, Arc::default(), asked.clone(), watched.then_some(facts))),
         recorder,
         parse: control::words::parse,
         ..Options::default()
@@ -102,7 +103,7 @@ fn drive(
     let live = Live::new(&ready.plan, &ready.registry, options);
     let live = live.map_err(|error| failure(error, &scenario.file.sources))?;
     let control = live.control();
-    let serving = watched.then(|| serve(&ready, &control)).flatten();
+    let serving = watched.then(|| serve(&ready, &control, &asked, ClockChoice::Wall)).flatten();
     if watched && serving.is_none() {
         return Err(Failure::new("the control interface is not open, so nobody can watch").code(1));
     }
@@ -148,10 +149,10 @@ fn allocations(report: &Report) -> f64 {
 }
 
 /// A log in the folder for such files, which is gone when it is written.
-fn recorder(facts: &Facts) -> Result<Box<dyn Recorder>, Failure> {
+fn recorder(facts: &Facts, asked: &Asked) -> Result<Box<dyn Recorder>, Failure> {
     let path = std::env::temp_dir().join(format!("sinew-bench-watch-{}.mcap", std::process::id()));
     let run = RunInfo { system: "exploration".into(), seed: Some(1), ..RunInfo::default() };
-    let made = LogFile::create(&path, &run, 0.0, facts.clone());
+    let made = LogFile::create(&path, &run, 0.0, facts.clone(), asked.clone());
     // The open file lives on without its name until it is closed.
     let _ = std::fs::remove_file(&path);
     made.map(|(file, _)| Box::new(file) as Box<dyn Recorder>)

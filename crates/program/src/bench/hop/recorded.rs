@@ -66,8 +66,8 @@ pub(super) fn run(
     let scratch = Scratch(path);
     let failed = |error: &dyn std::fmt::Display| Failure::new(error.to_string()).code(1);
     let info = RunInfo { system: plan.name.clone(), ..RunInfo::default() };
-    let (file, written) =
-        LogFile::create(&scratch.0, &info, 0.0, Facts::default(), Asked::default()).map_err(|error| failed(&error))?;
+    let (file, written) = LogFile::create(&scratch.0, &info, 0.0, Facts::default(), Asked::default())
+        .map_err(|error| failed(&error))?;
     let options = Options { recorder: Some(Box::new(file)), log: LogChoice::by(|_, _| 1), ..options };
     let report = parcel::run(live(plan, registry, options)?, outcome)?;
     let errors = written.lock().map(|written| written.errors.clone()).unwrap_or_default();
