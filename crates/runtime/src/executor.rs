@@ -7,6 +7,7 @@
 #![allow(unsafe_code)]
 
 mod change;
+mod serving;
 
 use std::any::Any;
 use std::cmp::Reverse;
@@ -24,7 +25,7 @@ use crate::context::{Context, ReadySet};
 use crate::door::{CHANGES, Door};
 use crate::handover::Running;
 use crate::os;
-use crate::port::InputEnd;
+use crate::port::{InputEnd, Rest};
 use crate::processor::{Checks, Reading, Stopwatch, agrees};
 use crate::ring::{self, ring};
 use crate::stats::{AgentStats, bump, bump_by, nanos};
@@ -212,9 +213,13 @@ impl Core {
         for slot in 0..self.seats.len() as u32 {
             if bits & crate::door::bit_of(slot) != 0
                 && let Some(seat) = &self.seats[slot as usize]
-                && seat.on.iter().any(|input| input.has_message())
             {
-                self.ready.mark(slot);
+                if seat.on.iter().any(|input| input.has_message()) {
+                    self.ready.mark(slot);
+                } else {
+                    // Another one was there first.
+                    self.rest_at_queues(slot, Rest::Ready);
+                }
             }
         }
         if bits & CHANGES != 0 {
@@ -254,6 +259,7 @@ impl Core {
                     seat.put_off = earliest;
                     self.push_release(earliest, slot);
                 }
+                self.rest_at_queues(slot, Rest::Away);
                 continue;
             }
             return Some(Job { slot, release: now, deadline: now.saturating_add(seat.timing.deadline) });
@@ -286,8 +292,12 @@ impl Core {
                 seat.alarm = Time::NEVER;
             }
             if seat.put_off <= now {
-                release = release.or(Some(seat.put_off));
-                seat.put_off = Time::NEVER;
+                let put_off = core::mem::replace(&mut seat.put_off, Time::NEVER);
+                if release.is_none() && seat.lost_to_others() {
+                    self.rest_at_queues(slot, Rest::Ready);
+                    continue;
+                }
+                release = release.or(Some(put_off));
             }
             if let Some(release) = release
                 && let Some(rank) = self.ready.rank_of(slot)
@@ -341,13 +351,17 @@ impl Core {
             bump(&seat.stats.releases);
             match seat.fault {
                 StepFault::None | StepFault::Panic => {}
-                StepFault::Off => return Some(Ended::NotRun),
+                StepFault::Off => return Some(core.left_out(job.slot)),
                 StepFault::Slow if !seat.stats.releases.load(Ordering::Relaxed).is_multiple_of(4) => {
-                    return Some(Ended::NotRun);
+                    return Some(core.left_out(job.slot));
                 }
                 StepFault::Slow => {}
                 StepFault::Hang => {
                     seat.fault = StepFault::None;
+                    // Nobody counts on it any more, as on one that is in a step.
+                    for input in &seat.on {
+                        input.begin_step();
+                    }
                     core.running.limit.store(seat.timing.hang_after.0 as u64, Ordering::Relaxed);
                     return Some(Ended::AskedToHang(job.slot));
                 }
@@ -376,7 +390,7 @@ impl Core {
             if panics {
                 seat.fault = StepFault::None;
             }
-            (first, panics, seat.on.iter().map(|input| input.taken()).sum::<u64>())
+            (first, panics, seat.on.iter().map(|input| input.begin_step()).sum::<u64>())
         };
         // SAFETY: as above. The figures are shared with the watchdog's side and outlive the core, whoever has it.
         let running = unsafe { &*Arc::as_ptr(&(*core).running) };
@@ -478,6 +492,7 @@ impl Core {
         };
         if let Some(cause) = cause {
             let id = seat.id;
+            self.rest(job.slot, Rest::Away);
             self.answer(Answer::Died { slot: job.slot, id, time: end, cause, body: body.take() });
             return;
         }
@@ -489,9 +504,7 @@ impl Core {
         let Some(seat) = self.seats[job.slot as usize].as_ref() else { return };
         // What came meanwhile makes it run again; but an agent that does not take its messages is not run for them for ever.
         let took_some = seat.on.iter().map(|input| input.taken()).sum::<u64>() != taken;
-        if took_some && seat.on.iter().any(|input| input.has_message()) {
-            self.ready.mark(job.slot);
-        }
+        self.rest(job.slot, Rest::Stepped(took_some));
     }
 
     /// Takes an agent that does not come back from its step for dead. Its body is lost to the step; in simulated time it is

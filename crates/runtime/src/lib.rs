@@ -66,6 +66,8 @@ mod os;
 mod plan;
 mod port;
 mod processor;
+mod queue;
+mod queue_plan;
 mod request;
 mod ring;
 mod router;
@@ -99,8 +101,10 @@ pub use port::{
     Direction, Envelope, Input, Output, OutputFault, Port, PortEnds, PortOptions, PortShape, PortVisit,
     Received, Sent, WireCounts, WireId,
 };
+pub use queue_plan::{MOST_SERVING, Queue, QueuePlan};
 pub use request::{
-    AgentState, AgentView, Counts, ExecutorView, FaultKind, PortView, Refusal, Request, SystemView, WireView,
+    AgentState, AgentView, Counts, ExecutorView, FaultKind, PortView, QueueView, ReceiverView, Refusal,
+    Request, SystemView, WireView,
 };
 pub use ring::{MOST_MESSAGES, Overload};
 pub use router::{Incident, ServiceShape, robot_wires};

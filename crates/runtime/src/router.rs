@@ -8,6 +8,7 @@ mod agents;
 mod calls;
 mod changes;
 mod deaths;
+mod queues;
 mod requests;
 mod view;
 mod wires;
@@ -23,6 +24,7 @@ use crate::log::{LogChoice, LogShared};
 use crate::names::Directory;
 use crate::plan::{AgentPlan, ExecutorPlan, WireFilter, WirePlan};
 use crate::port::{Direction, InputEnd, OutputEnd, PortEnds, WireCounts, WireId};
+use crate::queue_plan::QueuePlan;
 use crate::request::{AgentState, Refusal};
 use crate::ring::Overload;
 use crate::stats::AgentStats;
@@ -136,6 +138,7 @@ pub(crate) struct Router {
     registry: Registry,
     agents: Vec<Known>,
     wires: Vec<Wire>,
+    queues: Vec<queues::Queue>,
     pub executors: Vec<ExecutorKnown>,
     next_agent: u32,
     next_wire: u32,
@@ -171,6 +174,7 @@ impl Router {
             registry,
             agents: Vec::new(),
             wires: Vec::new(),
+            queues: Vec::new(),
             executors,
             next_agent: 0,
             next_wire: 0,
@@ -289,11 +293,12 @@ impl Router {
     }
 
     /// The running system as a plan that would start it.
-    pub(crate) fn to_plan(&self) -> (Vec<AgentPlan>, Vec<WirePlan>) {
+    pub(crate) fn to_plan(&self) -> (Vec<AgentPlan>, Vec<QueuePlan>, Vec<WirePlan>) {
         let agents =
             self.agents.iter().map(|known| AgentPlan { params: known.params.clone(), ..known.plan.clone() });
         let wires = self.wires.iter().filter(|wire| !wire.is_answer).map(|wire| self.plan_of(wire));
-        (agents.collect(), wires.collect())
+        let (queues, to_queues) = self.plans_of_queues();
+        (agents.collect(), queues, wires.chain(to_queues).collect())
     }
 }
 

@@ -224,7 +224,13 @@ impl Player {
                 loop {
                     let core = &mut self.cores[at];
                     core.look_at_door(&self.context, self.now);
-                    let Some(job) = core.next(self.now) else { break };
+                    let Some(job) = core.next(self.now) else {
+                        // One that must wait has passed a call on.
+                        if self.is_rung_before(place) {
+                            continue 'again;
+                        }
+                        break;
+                    };
                     // SAFETY: the core lives in this thread's own array, and nobody else takes it.
                     let ended = unsafe { Core::run(core, &self.context, job, self.now, None, || true) };
                     steps += 1;
@@ -246,6 +252,11 @@ impl Player {
             }
             return Ok(());
         }
+    }
+
+    /// Whether somebody has rung at an executor that goes before this one and is not kept busy.
+    fn is_rung_before(&self, place: usize) -> bool {
+        self.order[..place].iter().any(|at| self.blocked[*at] <= self.now && self.cores[*at].door.is_rung())
     }
 
     /// An agent is stuck in virtual time: its executor does nothing until the watchdog has given it up.

@@ -2,7 +2,9 @@
 
 use program::file::{self, Shelf, read_plan, write_plan};
 use proptest::prelude::*;
-use runtime::{AgentPlan, ExecutorPlan, OnDeath, Overload, Plan, TimedRequest, WireFilter, WirePlan};
+use runtime::{
+    AgentPlan, ExecutorPlan, OnDeath, Overload, Plan, QueuePlan, TimedRequest, WireFilter, WirePlan,
+};
 use types::value::{Span, Table, Value};
 use types::{Category, Duration, Priority};
 
@@ -14,6 +16,7 @@ fn bare(mut plan: Plan) -> Plan {
     plan.executors.iter_mut().for_each(|executor| executor.at = Span::default());
     plan.requests.iter_mut().for_each(|request| request.place = Span::default());
     plan.wires.iter_mut().for_each(|wire| wire.at = Span::default());
+    plan.queues.iter_mut().for_each(|queue| queue.at = Span::default());
     let outputs: Vec<String> = plan.wires.iter().map(|wire| wire.from.clone()).collect();
     plan.wires.sort_by_key(|wire| outputs.iter().position(|output| *output == wire.from));
     plan
@@ -179,9 +182,18 @@ fn wire(to: String) -> impl Strategy<Value = WirePlan> {
     )
 }
 
+fn queue() -> impl Strategy<Value = (QueuePlan, Option<u8>)> {
+    let policies = vec![None, Some(Overload::NewestWins), Some(Overload::OldestWins), Some(Overload::Refuse)];
+    let parts = (proptest::option::of(1usize..1000), proptest::sample::select(policies), any::<Option<u8>>());
+    parts.prop_map(|(depth, overload, serving)| {
+        (QueuePlan { depth, overload, ..QueuePlan::new("seen") }, serving)
+    })
+}
+
 fn plans() -> impl Strategy<Value = Plan> {
-    let whole = (executors(), agents(), "\\PC{0,12}", proptest::option::of(times()));
-    whole.prop_flat_map(|(executors, mut agents, name, time)| {
+    let whole =
+        (executors(), agents(), "\\PC{0,12}", proptest::option::of(times()), proptest::option::of(queue()));
+    whole.prop_flat_map(|(executors, mut agents, name, time, queue)| {
         let wires: Vec<_> = agents.iter().map(|agent| wire(format!("{}.ranges", agent.name))).collect();
         agents.push(AgentPlan {
             name: "eyes".into(),
@@ -189,6 +201,17 @@ fn plans() -> impl Strategy<Value = Plan> {
             on: vec!["echoes".into()],
             ..AgentPlan::default()
         });
+        let mut queued = Vec::new();
+        let mut queues = Vec::new();
+        if let Some((queue, serving)) = queue {
+            queued.push(WirePlan::new("eyes.filtered", queue.name.clone()));
+            let inputs = agents.iter().filter(|agent| agent.name != "eyes");
+            queued.extend(inputs.map(|agent| {
+                let serving = serving.map(|serving| serving % (1 + runtime::MOST_SERVING));
+                WirePlan { serving, ..WirePlan::new(queue.name.clone(), format!("{}.ranges", agent.name)) }
+            }));
+            queues.push(queue);
+        }
         let requests = time.map(|at| TimedRequest {
             at,
             words: ["fault", agents[0].name.as_str(), "slow"].map(str::to_owned).to_vec(),
@@ -198,7 +221,8 @@ fn plans() -> impl Strategy<Value = Plan> {
             name: name.clone(),
             executors: executors.clone(),
             agents: agents.clone(),
-            wires,
+            queues: queues.clone(),
+            wires: wires.into_iter().chain(queued.clone()).collect(),
             requests: requests.iter().cloned().collect(),
             sections: Table::new(),
         })

@@ -14,7 +14,7 @@ use crate::allocations;
 use crate::context::Context;
 use crate::door::Door;
 use crate::handover::Running;
-use crate::port::{Envelope, InputEnd, OutputEnd, WireId};
+use crate::port::{Envelope, InputEnd, OutputEnd, Rest, WireId};
 use crate::ring;
 use crate::stats::{bump, bump_by};
 use crate::turn::Turn;
@@ -230,7 +230,9 @@ impl Core {
             }
             Change::Join { end, lanes, slot } => {
                 end.join(lanes.as_mut());
-                let _ = slot;
+                if end.serves() {
+                    self.rest_at_queues(*slot, Rest::Ready);
+                }
             }
             Change::Leave { end, wire, into, force } => {
                 if !*force && !end.is_drained(*wire) {
@@ -275,6 +277,7 @@ impl Core {
                 if let Some(seat) = self.seats.get_mut(*slot as usize).and_then(Option::as_mut) {
                     seat.fault = *fault;
                 }
+                self.rest_at_queues(*slot, Rest::Ready);
             }
             Change::Nothing => {}
             Change::OutputFault { end, faulty } => end.set_fault(faulty.as_mut()),
@@ -320,11 +323,9 @@ impl Core {
         self.stop_agent(&mut seat, context, now);
         core::mem::swap(&mut seat.body, body);
         seat.started = false;
-        let has_message = seat.on.iter().any(|input| input.has_message());
+        let why = if seat.body.is_some() { Rest::Ready } else { Rest::Away };
         self.seats[slot as usize] = Some(seat);
-        if has_message {
-            self.ready.mark(slot);
-        }
+        self.rest(slot, why);
     }
 
     fn stop_agent(&self, seat: &mut Seat, context: &Context, now: Time) {

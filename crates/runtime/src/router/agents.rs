@@ -22,8 +22,8 @@ impl Router {
         readers: &[usize],
         fabric: &mut dyn Fabric,
     ) -> Reply<AgentId> {
-        if self.agents.iter().any(|agent| agent.plan.name == plan.name) {
-            return Err(Refusal::new(format!("there is already an agent \"{}\"", plan.name))
+        if self.agents.iter().any(|agent| agent.plan.name == plan.name) || self.is_queue(&plan.name) {
+            return Err(Refusal::new(format!("there is already something called \"{}\"", plan.name))
                 .help("names are given once"));
         }
         let kind = self
@@ -148,6 +148,9 @@ impl Router {
     }
 
     pub(super) fn remove(&mut self, name: &str, fabric: &mut dyn Fabric) -> Reply<()> {
+        if self.is_queue(name) {
+            return self.remove_queue(name);
+        }
         let at = self.index(name)?;
         if self.robots.iter().any(|robot| robot == name) {
             return Err(Refusal::new(format!(
@@ -164,6 +167,10 @@ impl Router {
             return Err(Refusal::new(format!("the wire from {from} to {to} takes what is for {name}"))
                 .help("cut that wire first"));
         }
+        if let Some(WirePlan { from, to, .. }) = self.queue_wire_for(name, id) {
+            return Err(Refusal::new(format!("the wire from {from} to {to} takes what is for {name}"))
+                .help("cut that wire first"));
+        }
         let wires: Vec<WireId> = self
             .wires
             .iter()
@@ -175,6 +182,7 @@ impl Router {
         for wire in &wires {
             self.cut(*wire, true, fabric)?;
         }
+        self.leave_queues(id, fabric)?;
         self.commit(executor, Change::Unseat { slot, seat: None }, fabric)?;
         self.agents.retain(|agent| agent.id != id);
         self.executors[executor].slots[slot as usize] = false;

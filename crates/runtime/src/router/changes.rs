@@ -9,6 +9,7 @@ use crate::request::Refusal;
 impl Router {
     /// Computes the data-flow order of an executor and gives it to it.
     pub(super) fn commit_order(&mut self, executor: usize, fabric: &mut dyn Fabric) -> Reply<()> {
+        self.rank_receivers();
         let order = self.data_flow_order(executor);
         let slots = self.executors[executor].slots.len();
         let mut ranks = vec![u32::MAX; slots];
@@ -28,8 +29,9 @@ impl Router {
         let place = |id: AgentId| members.iter().position(|member| member.id == id);
         let mut behind: Vec<Vec<usize>> = vec![Vec::new(); members.len()];
         let mut before = vec![0usize; members.len()];
-        for wire in self.wires.iter().filter(|wire| !wire.is_answer) {
-            if let (Some(a), Some(b)) = (place(wire.from.0), place(wire.to.0))
+        let wires = self.wires.iter().filter(|wire| !wire.is_answer).map(|wire| (wire.from.0, wire.to.0));
+        for (from, to) in wires.chain(self.flow_of_queues()) {
+            if let (Some(a), Some(b)) = (place(from), place(to))
                 && a != b
             {
                 behind[a].push(b);

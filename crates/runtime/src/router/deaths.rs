@@ -82,7 +82,7 @@ impl Router {
     pub(super) fn renew(&mut self, id: AgentId, fabric: &mut dyn Fabric) {
         let Some(at) = self.agents.iter().position(|known| known.id == id) else { return };
         let touched = |wire: &Wire| wire.from.0 == id || wire.to.0 == id;
-        let plans: Vec<WirePlan> = self
+        let mut plans: Vec<WirePlan> = self
             .wires
             .iter()
             .filter(|wire| touched(wire) && !wire.is_answer)
@@ -111,6 +111,7 @@ impl Router {
             }
         }
         self.wires.retain(|wire| wire.from.0 != id && wire.to.0 != id);
+        plans.extend(self.abandon_queues(id));
         let known = self.agents.remove(at);
         let _ = self.commit(known.executor, Change::Unseat { slot: known.slot, seat: None }, fabric);
         self.executors[known.executor].slots[known.slot as usize] = false;

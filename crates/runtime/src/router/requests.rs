@@ -42,7 +42,8 @@ impl Router {
                 executors.extend(robot.iter().flat_map(|wire| [of(&wire.from), of(&wire.to)]).flatten());
             }
             Request::All(requests) => requests.iter().for_each(|request| self.concerned(request, executors)),
-            Request::Restart(_)
+            Request::Queue(_)
+            | Request::Restart(_)
             | Request::Replace { .. }
             | Request::Set { .. }
             | Request::Fault { .. }
@@ -57,6 +58,7 @@ impl Router {
             Request::Remove(agent) => self.remove(&agent, fabric),
             Request::Restart(agent) => self.restart_now(&agent, fabric),
             Request::Replace { agent, kind, params } => self.replace(&agent, &kind, &params, fabric),
+            Request::Queue(plan) => self.add_queue(plan),
             Request::Wire(plan) => self.wire(&plan, fabric),
             Request::Unwire { from, to } => self.unwire(&from, &to, fabric),
             Request::Set { agent, key, value } => self.set(&agent, &key, value, fabric),
@@ -106,8 +108,12 @@ impl Router {
     pub(super) fn inverse(&self, request: &Request) -> Option<Request> {
         match request {
             Request::Add(plan) => Some(Request::Remove(plan.name.clone())),
+            Request::Queue(plan) => Some(Request::Remove(plan.name.clone())),
             Request::Wire(wire) => Some(Request::Unwire { from: wire.from.clone(), to: wire.to.clone() }),
             Request::Unwire { from, to } => {
+                if let Some(plan) = self.queue_wire(from, to) {
+                    return Some(Request::Wire(plan));
+                }
                 let wire = self.find_wire(from, to)?;
                 Some(Request::Wire(self.plan_of(wire)))
             }

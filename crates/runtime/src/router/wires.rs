@@ -33,6 +33,9 @@ impl Router {
 
     /// Makes a wire.
     pub(crate) fn wire(&mut self, plan: &WirePlan, fabric: &mut dyn Fabric) -> Reply<()> {
+        if let Some(done) = self.wire_queue(plan, fabric) {
+            return done;
+        }
         let (from, to) = (self.port(&plan.from)?, self.port(&plan.to)?);
         if self.find_wire(&plan.from, &plan.to).is_some() {
             return Err(Refusal::new(format!("{} is already wired to {}", plan.from, plan.to)));
@@ -171,16 +174,21 @@ impl Router {
 
     /// How many routes lead out of a port.
     pub(super) fn routes_from(&self, port: (AgentId, usize)) -> usize {
-        self.wires.iter().filter(|wire| wire.from == port).count() + self.calls_of(port)
+        self.wires.iter().filter(|wire| wire.from == port).count()
+            + self.queues_from(port)
+            + self.calls_of(port)
     }
 
     /// How many lanes lead into a port at most.
     pub(super) fn lanes_into(&self, port: (AgentId, usize)) -> usize {
         let wires = self.wires.iter().filter(|wire| wire.to == port).count();
-        (wires + self.calls_of(port)) * Priority::ALL.len()
+        (wires + self.calls_of(port)) * Priority::ALL.len() + self.queues_into(port)
     }
 
     pub(super) fn unwire(&mut self, from: &str, to: &str, fabric: &mut dyn Fabric) -> Reply<()> {
+        if let Some(done) = self.unwire_queue(from, to, fabric) {
+            return done;
+        }
         self.port(from)?;
         self.port(to)?;
         let Some(wire) = self.find_wire(from, to) else {
