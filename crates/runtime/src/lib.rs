@@ -49,6 +49,19 @@
 //! let report = Simulation::new(&plan, &registry![Source, Sink], options).unwrap().run().unwrap();
 //! assert_eq!(report.view.agents[1].counts.releases, 101);
 //! ```
+//!
+//! Several inputs can share a mailbox: a [`Queue`]. Each message in it goes to one of them, and of those that wait the one of highest
+//! priority is called; [`Plan::queue`] makes one. In a system file:
+//!
+//! ```toml
+//! [queue.work]
+//! depth = 32                          # of each sender and priority; "refuse" when it is full
+//!
+//! [wires]
+//! "finder.work" = ["work"]
+//! "sorter.work" = ["work"]
+//! work = ["fast.work", { to = "slow.work", serving = 10 }]
+//! ```
 
 mod agent;
 mod allocations;

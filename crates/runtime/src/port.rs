@@ -261,4 +261,4 @@ pub use input::{Input, Received};
 pub(crate) use input::{InputCore, downcast_input, input_core};
 pub use output::{Envelope, Output, Sent};
 pub(crate) use output::{OutputCore, downcast_output, output_core};
-pub(crate) use queue::{AnyBox, QueueEnd, QueueForm, QueueWire, Rest, Teller};
+pub(crate) use queue::{QueueEnd, QueueForm, QueueWire, Rest, Teller};

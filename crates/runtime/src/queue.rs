@@ -136,17 +136,20 @@ impl<P: Default + Send> Shared<P> {
     /// An end for a sender with these priorities; nothing where there are rings for no more.
     pub(crate) fn sender(self: &Arc<Self>, priorities: &[Priority]) -> Option<Sender<P>> {
         let mut free = self.free();
-        let made = self.rings.iter().filter(|ring| ring.get().is_some()).count();
-        let missing = priorities.len().saturating_sub(free.rings.len());
-        if made + missing > RINGS {
+        // One in which something is left of another sender would let that go first, however urgent the new one's messages are: it is
+        // given only where there is no other.
+        let made = self.rings().count();
+        let empty = free.rings.iter().filter(|(number, _)| self.ring(*number).waiting() == 0).count();
+        let missing = priorities.len().saturating_sub(empty).min(RINGS - made);
+        if free.rings.len() + missing < priorities.len() {
             return None;
         }
         for number in made..made + missing {
             let _ = self.rings[number].set(Ring::new(self.depth, SEATS));
             free.rings.push((number, Filling::new(self.depth as u16)));
         }
-        // The lowest number first: so the same changes give the same rings.
-        free.rings.sort_unstable_by_key(|(number, _)| *number);
+        // Then the lowest number first: so the same changes give the same rings.
+        free.rings.sort_by_cached_key(|(number, _)| (self.ring(*number).waiting() > 0, *number));
         let rings: Vec<(usize, Filling)> = free.rings.drain(..priorities.len()).collect();
         for (number, _) in &rings {
             self.ring(*number).open();

@@ -166,10 +166,11 @@ impl Reader<'_> {
 
     /// What to write in the place of a name that is no port: the nearest queue, if there are any.
     fn no_port_help(&self, name: &str) -> String {
-        let queues = self.plan.queues.iter().map(|queue| queue.name.as_str());
-        match nearest(name, queues) {
+        let queues: Vec<&str> = self.plan.queues.iter().map(|queue| queue.name.as_str()).collect();
+        match nearest(name, queues.iter().copied()) {
             Some(right) => format!("did you mean the queue \"{right}\"?"),
-            None => "write agent and port, as in \"sonar.filtered\", or the name of a queue".to_owned(),
+            None if queues.is_empty() => "write agent and port, as in \"sonar.filtered\"".to_owned(),
+            None => format!("write agent and port, or a queue: {}", queues.join(", ")),
         }
     }
 

@@ -82,6 +82,50 @@ fn what_the_file_says_is_in_the_plan() {
 }
 
 #[test]
+fn a_queue_is_read_with_the_wires_to_it_and_from_it() {
+    let text = r#"
+        name = "shared"
+        [agent.eyes]
+        is = "sonar"
+        on = "echoes"
+        [agent.left]
+        is = "safety-monitor"
+        on = "ranges"
+        [agent.right]
+        is = "safety-monitor"
+        on = "ranges"
+        [queue.seen]
+        depth = 8
+        overload = "oldest-wins"
+        [wires]
+        "eyes.filtered" = ["seen"]
+        seen = ["left.ranges", { to = "right.ranges", serving = 80 }]
+    "#;
+    let plan = read_plan(text, "shared.toml", &registry()).unwrap_or_else(|mistakes| panic!("{mistakes}"));
+    let queue = &plan.queues[0];
+    assert_eq!((queue.name.as_str(), queue.depth(), queue.overload()), ("seen", 8, Overload::OldestWins));
+    let wires: Vec<_> = plan.wires.iter().map(|wire| (&*wire.from, &*wire.to, wire.serving)).collect();
+    let expected =
+        [("eyes.filtered", "seen", None), ("seen", "left.ranges", None), ("seen", "right.ranges", Some(80))];
+    assert_eq!(wires, expected);
+    assert_eq!(again(&plan), bare(plan));
+
+    for (right, wrong, said) in [
+        ("[\"seen\"]", "[\"sen\"]", "\"sen\" is no port\n"),
+        ("[\"seen\"]", "[\"sen\"]", "did you mean the queue \"seen\"?"),
+        ("serving = 80", "serving = 100", "\"serving\" is 100, it must lie from 0 to 99"),
+        ("right.ranges", "left.ranges", "there are two wires from seen to left.ranges"),
+        ("[\"seen\"]", "[{ to = \"seen\", depth = 3 }]", "depth and overload are those of queue \"seen\""),
+        ("\"left.ranges\"", "{ to = \"left.ranges\", every = 2 }", "has a filter"),
+        ("eyes.filtered", "left.safety", "queue \"seen\" holds SafetyState, left.ranges has"),
+    ] {
+        let text = text.replacen(right, wrong, 1);
+        let mistakes = read_plan(&text, "shared.toml", &registry()).unwrap_err().to_string();
+        assert!(mistakes.contains(said), "{mistakes}");
+    }
+}
+
+#[test]
 fn a_change_changes_one_entry_and_nothing_else() {
     let sets = ["agent.drive.period=40ms".to_owned()];
     let mut wanted = bare(file::load("exploration", &[], &registry()).unwrap().plan);

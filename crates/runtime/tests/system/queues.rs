@@ -1,12 +1,12 @@
 //! Queues: several inputs share a mailbox, and each message goes to one of them.
 
-use core::sync::atomic::{AtomicBool, AtomicU64, Ordering};
+use core::sync::atomic::{AtomicBool, Ordering};
 use std::collections::BTreeMap;
 use std::sync::{Arc, Mutex};
 
 use runtime::{
-    Agent, AgentPlan, Envelope, Fault, Input, Live, Options, Output, Overload, Params, Plan, Registry,
-    Report, Request, Simulation, Step, SystemView, WirePlan, registry,
+    Agent, Envelope, Fault, Input, Live, Options, Output, Overload, Params, Plan, Registry, Report, Request,
+    Simulation, Step, SystemView, WirePlan, registry,
 };
 use types::chance::Stream;
 use types::messages::{Image, Twist};
@@ -66,6 +66,9 @@ struct FeederParams {
 
 impl Agent for Feeder {
     fn step(&mut self, step: &mut Step) -> Result<(), Fault> {
+        if !self.work.has_listeners() {
+            return Ok(());
+        }
         let FeederParams { sender, burst, most, urgent, ahead, .. } = self.params;
         if urgent > 0 {
             for _ in 0..burst {
@@ -519,4 +522,158 @@ fn what_cannot_be_wired_to_a_queue_is_refused_in_one_sentence() {
         let refusal = asker.unwrap().join().unwrap().unwrap_err();
         assert!(refusal.what.contains(expected), "{refusal}");
     }
+}
+
+/// Any changes, in simulated time: who sends and who takes comes, goes, panics and hangs.
+#[test]
+fn each_message_is_taken_once_whoever_comes_goes_dies_and_hangs() {
+    for seed in 0..20 {
+        let test = format!("storm-{seed}");
+        let mut plan = plan(&test, &THREE);
+        plan.queue_mut("work").unwrap().depth = Some(512);
+        for agent in &mut plan.agents {
+            (agent.params).set("each", Value::from(1 + seed as i64 % 3));
+        }
+        plan.agents[0].params = FeederParams { burst: 2, ..feeder(&test) }.to_table();
+        let second = plan.add::<Feeder>("second", FeederParams { sender: 1, burst: 3, ..feeder(&test) });
+        plan.wires.push(WirePlan::new(second.work.name, "work"));
+        plan.every("second", Duration::millis(7));
+        for i in 0..100 {
+            let draws = Stream::new(seed, "storm").sample(i);
+            let who = ["low", "high", "middle"][draws.index(0, 3)];
+            let from = ["feeder", "second"][draws.index(1, 2)];
+            let words = match draws.index(2, 8) {
+                0 => format!("fault {who} panic"),
+                1 => format!("fault {who} hang"),
+                2 => format!("unwire work {who}.work"),
+                3 | 4 => format!("wire work {who}.work"),
+                5 => format!("unwire {from}.work work"),
+                6 => format!("wire {from}.work work"),
+                _ => format!("restart {who}"),
+            };
+            plan.requests.push(at(10 * i as i64 + draws.index(3, 10) as i64, &words));
+        }
+        plan.requests.sort_by_key(|request| request.at);
+        let report = simulate(&plan, 1100);
+        let queue = &report.view.queues[0];
+        assert!(queue.sent > 50, "{queue:?}");
+        // A worker that panics does so before it takes; what was taken was written down.
+        once_and_in_order(&test, queue.sent, queue.waiting as u64);
+    }
+}
+
+/// A machine that is busy with other things makes nobody hang.
+fn patient(plan: &mut Plan) {
+    for agent in &mut plan.agents {
+        let is_worker = agent.kind == "worker";
+        agent.hang_after = Some(if is_worker { Duration::secs(1) } else { Duration::secs(60) });
+    }
+}
+
+/// Ends when everything was taken.
+struct AllTaken {
+    test: &'static str,
+    most: usize,
+    looks: u32,
+}
+
+impl runtime::Observer for AllTaken {
+    fn every(&self) -> Duration {
+        Duration::millis(10)
+    }
+    fn observe(&mut self, _: types::Time, _: &[runtime::Incident]) -> runtime::Verdict {
+        self.looks += 1;
+        // Something is wrong after a minute.
+        if taken(self.test).len() >= self.most || self.looks > 6000 {
+            runtime::Verdict::End("everything was taken".into())
+        } else {
+            runtime::Verdict::GoOn
+        }
+    }
+}
+
+#[test]
+fn on_the_wall_clock_each_message_is_taken_once_while_workers_come_and_go_and_die() {
+    const MOST: u32 = 2000;
+    let test = "wall-queue";
+    let mut plan = plan(test, &THREE);
+    plan.queue_mut("work").unwrap().depth = Some(1024);
+    plan.agents[0].params = FeederParams { burst: 2, most: MOST, ..feeder(test) }.to_table();
+    plan.every("feeder", Duration::millis(1));
+    let second =
+        plan.add::<Feeder>("second", FeederParams { sender: 1, burst: 2, most: MOST, ..feeder(test) });
+    plan.wires.push(WirePlan::new(second.work.name, "work"));
+    plan.every("second", Duration::millis(1));
+    plan.agent_mut("second").unwrap().executor = Some("receive".into());
+    patient(&mut plan);
+    // The highest dies of some work that it has taken.
+    plan.agent_mut("high").unwrap().params.set("breaks", Value::from(500));
+    let observer = Box::new(AllTaken { test, most: 2 * MOST as usize, looks: 0 });
+    let options = Options { limit: None, observer, ..options(0) };
+    let live = Live::new(&plan, &types(), options).unwrap();
+    let control = live.control();
+    let done = Arc::<AtomicBool>::default();
+    let asking = done.clone();
+    let asker = std::thread::Builder::new().name("asker".into()).spawn(move || {
+        let mut asked = 0;
+        for words in [
+            "unwire work high.work",
+            "wire work high.work",
+            "unwire work middle.work",
+            "restart low",
+            "wire work middle.work",
+            "fault middle hang",
+            "unwire feeder.work work",
+            "wire feeder.work work",
+        ]
+        .iter()
+        .cycle()
+        {
+            if asking.load(Ordering::Acquire) {
+                break;
+            }
+            let words: Vec<String> = words.split(' ').map(str::to_owned).collect();
+            // One who is in a hang is not there to be asked.
+            asked += u64::from(control.request(parse(&words).unwrap()).is_ok());
+            let before = taken("wall-queue").len();
+            for _ in 0..100 {
+                if taken("wall-queue").len() > before + 20 || control.view().is_err() {
+                    break;
+                }
+                std::thread::yield_now();
+            }
+        }
+        asked
+    });
+    let report = live.run().unwrap();
+    done.store(true, Ordering::Release);
+    let asked = asker.unwrap().join().unwrap();
+    assert!(asked > 8, "{asked}");
+    balanced(&report.view);
+    let mut of_sender: BTreeMap<u64, Vec<u64>> = BTreeMap::new();
+    for (_, number, sender, _) in taken(test) {
+        of_sender.entry(sender).or_default().push(number);
+    }
+    for (sender, mut numbers) in of_sender {
+        // They are written down by several: the order is that of writing.
+        numbers.sort_unstable();
+        assert_eq!(numbers, (1..=u64::from(MOST)).collect::<Vec<_>>(), "of sender {sender}");
+    }
+}
+
+#[test]
+fn on_the_wall_clock_the_highest_who_waits_gets_nearly_all_of_a_slow_stream() {
+    let test = "wall-highest";
+    let mut plan = plan(test, &THREE);
+    plan.agents[0].params = FeederParams { most: 100, ..feeder(test) }.to_table();
+    plan.every("feeder", Duration::millis(2));
+    patient(&mut plan);
+    let observer = Box::new(AllTaken { test, most: 100, looks: 0 });
+    let report =
+        Live::new(&plan, &types(), Options { limit: None, observer, ..options(0) }).unwrap().run().unwrap();
+    balanced(&report.view);
+    assert_eq!(taken(test).len(), 100);
+    // On a machine that is busy it may still be at work with the last one when the next one comes.
+    let of = |who| numbers(test, who).len();
+    assert!(of("high") > of("middle") + of("low"), "{} {} {}", of("high"), of("middle"), of("low"));
 }
