@@ -65,8 +65,8 @@ impl Commands {
     }
 
     fn plan(&self) -> Answer {
-        let (agents, wires) = self.control.plan()?;
-        Ok(shapes::plan(&self.control.view()?.name, &agents, &wires))
+        let (agents, queues, wires) = self.control.plan()?;
+        Ok(shapes::plan(&self.control.view()?.name, &agents, &queues, &wires))
     }
 
     fn why(&self, rest: &[String]) -> Answer {

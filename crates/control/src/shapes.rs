@@ -2,19 +2,20 @@
 //!
 //! | shape | keys |
 //! |---|---|
-//! | `ls` | `system`, `time_s`, `agents`: rows of `name`, `kind`, `state` (`running`, `restarting`, `dead`), `executor`, `asked`, `granted`, `period_s` (null without one), `deadline_s`, the counts, `last_death` (null when it never died), `params` |
-//! | `graph` | `system`, `time_s`, `agents`: rows of `name`, `kind`, `doc`, `executor`, `ports`: rows of `name`, `doc`, `direction` (`input`, `output`, `service`, `client`), `message`, `sent`; `wires`: rows of `from`, `to`, `message`, `depth`, `overload`, `filter`, `sent`, `taken`, `dropped`, `refused`, `expired` |
+//! | `ls` | `system`, `time_s`, `agents`: rows of `name`, `kind`, `state` (`running`, `restarting`, `dead`), `executor`, `asked`, `granted`, `period_s` (null without one), `deadline_s`, the counts, `last_death` (null when it never died), `params`; `queues` |
+//! | `graph` | `system`, `time_s`, `agents`: rows of `name`, `kind`, `doc`, `executor`, `ports`: rows of `name`, `doc`, `direction` (`input`, `output`, `service`, `client`), `message`, `sent`; `wires`: rows of `from`, `to`, `message`, `depth`, `overload`, `filter`, `sent`, `taken`, `dropped`, `refused`, `expired`; `queues` |
 //! | `top` | `system`, `time_s`, `messages`: `sent`, `taken`, `dropped`, `refused`, `expired` over all wires; `agents`: rows of `name`, `state`, `executor`, `asked`, `granted`, the counts, and the figures `exec`, `jitter`, `response` |
 //! | counts | `releases`, `missed`, `stalled`, `skipped`, `faults`, `panics`, `hangs`, `restarts`; of execution times `left_out` (a stall was in the step), `checked` (held against the clock of the thread) and `disagreed`; `allocations` (how often steps took or freed memory, where the program watches that) |
 //! | figure | `name`, `unit`, `n`, `min`, `p50`, `p99`, `p999`, `max`: unfiltered; all values null while `n` is 0 |
+//! | `queues` | rows of `name`, `message` (null before anybody is wired to it), `depth`, `overload`, `waiting`, `sent`, `dropped`, `refused`, `taken`, `receivers`: rows of `to`, `serving`, `taken`; what was sent and taken on wires that are gone counts too |
 //! | filter | `category` (null for all), `priority` (the least), `marker`, `recipient` (the name of an agent, null for all), `every` |
 //!
 //! `time_s` is the system's own clock (s). `asked` and `granted` are the scheduling, as in `fifo 70`. Whatever was asked for and
 //! not granted, dropped or missed is in these numbers.
 
 use runtime::{
-    AgentPlan, AgentView, Direction, Figure, PortView, Refusal, Request, SystemView, WireFilter, WirePlan,
-    WireView,
+    AgentPlan, AgentView, Direction, Figure, PortView, QueuePlan, QueueView, Refusal, Request, SystemView,
+    WireFilter, WirePlan, WireView,
 };
 use serde_json::{Map, Value as Json, json};
 use types::Duration;
@@ -33,13 +34,13 @@ pub fn figure(name: &str, figure: &Figure) -> Json {
 
 /// The agents and how they are.
 pub fn ls(view: &SystemView) -> Json {
-    system(view, view.agents.iter().map(ls_agent).collect(), [])
+    system(view, view.agents.iter().map(ls_agent).collect(), [("queues", queues(view))])
 }
 
 /// Agents with their ports, and the wires between them.
 pub fn graph(view: &SystemView) -> Json {
     let wires = view.wires.iter().map(graph_wire).collect();
-    system(view, view.agents.iter().map(graph_agent).collect(), [("wires", wires)])
+    system(view, view.agents.iter().map(graph_agent).collect(), [("wires", wires), ("queues", queues(view))])
 }
 
 /// Timing and counts.
@@ -53,30 +54,35 @@ pub fn top(view: &SystemView) -> Json {
 }
 
 /// The running system as the requests that would build it, each as a row of words.
-pub fn plan(name: &str, agents: &[AgentPlan], wires: &[WirePlan]) -> Json {
+pub fn plan(name: &str, agents: &[AgentPlan], queues: &[QueuePlan], wires: &[WirePlan]) -> Json {
     let adds = agents.iter().map(|agent| words::words_of(&Request::Add(agent.clone())));
     let wires = wires.iter().map(|wire| words::words_of(&Request::Wire(wire.clone())));
-    json!({"system": name, "requests": adds.chain(wires).collect::<Vec<_>>()})
+    let queues = queues.iter().map(|queue| words::words_of(&Request::Queue(queue.clone())));
+    json!({"system": name, "requests": adds.chain(queues).chain(wires).collect::<Vec<_>>()})
 }
+
+/// The agents, queues and wires of a plan.
+pub type Parts = (Vec<AgentPlan>, Vec<QueuePlan>, Vec<WirePlan>);
 
 /// Reads what [`plan`] wrote.
 ///
 /// # Errors
 /// When it is something else.
-pub fn read_plan(json: &Json) -> Result<(Vec<AgentPlan>, Vec<WirePlan>), Refusal> {
+pub fn read_plan(json: &Json) -> Result<Parts, Refusal> {
     let wrong = || Refusal::new("this is no plan of a running system");
-    let (mut agents, mut wires) = (Vec::new(), Vec::new());
+    let (mut agents, mut queues, mut wires) = (Vec::new(), Vec::new(), Vec::new());
     for request in json["requests"].as_array().ok_or_else(wrong)? {
         let words: Option<Vec<String>> = request
             .as_array()
             .and_then(|row| row.iter().map(|word| word.as_str().map(str::to_owned)).collect());
         match words::parse(&words.ok_or_else(wrong)?)? {
             Request::Add(agent) => agents.push(agent),
+            Request::Queue(queue) => queues.push(queue),
             Request::Wire(wire) => wires.push(wire),
             _ => return Err(wrong()),
         }
     }
-    Ok((agents, wires))
+    Ok((agents, queues, wires))
 }
 
 fn system<const N: usize>(view: &SystemView, agents: Vec<Json>, more: [(&str, Json); N]) -> Json {
@@ -156,6 +162,21 @@ fn graph_wire(wire: &WireView) -> Json {
     })
 }
 
+fn queues(view: &SystemView) -> Json {
+    view.queues.iter().map(queue).collect()
+}
+
+fn queue(queue: &QueueView) -> Json {
+    let receivers = queue.receivers.iter();
+    let receivers = receivers.map(|to| json!({"to": to.to, "serving": to.serving, "taken": to.taken}));
+    json!({
+        "name": queue.name, "message": Some(queue.message).filter(|message| !message.is_empty()),
+        "depth": queue.depth, "overload": queue.overload.name(), "waiting": queue.waiting, "sent": queue.sent,
+        "dropped": queue.dropped, "refused": queue.refused, "taken": queue.taken,
+        "receivers": receivers.collect::<Vec<_>>(),
+    })
+}
+
 fn filter(filter: &WireFilter) -> Json {
     json!({
         "category": filter.category.map(|category| category.name()),
@@ -181,8 +202,9 @@ mod tests {
         let mut agent = AgentPlan { name: "a".into(), kind: "b".into(), ..AgentPlan::default() };
         agent.params.set("side", types::value::Value::from("far left"));
         let wire = WirePlan { depth: Some(3), ..WirePlan::new("a.out", "c.in") };
-        let json = plan("lab", std::slice::from_ref(&agent), std::slice::from_ref(&wire));
-        assert_eq!(read_plan(&json), Ok((vec![agent], vec![wire])));
+        let queue = QueuePlan { depth: Some(5), ..QueuePlan::new("e") };
+        let json = plan("lab", &[agent.clone()], &[queue.clone()], &[wire.clone()]);
+        assert_eq!(read_plan(&json), Ok((vec![agent], vec![queue], vec![wire])));
         assert!(read_plan(&json!({"requests": [["quit"]]})).is_err() && read_plan(&json!(3)).is_err());
     }
 }

@@ -16,13 +16,14 @@ pub fn schema(registry: &Registry) -> Json {
     let kinds = registry.types().iter().filter(|kind| kind.kind != "robot");
     let mut agents: Vec<Json> = kinds.map(agent).collect();
     agents.push(group());
-    let [name, world, robot_, executor_, agent_, wires_, decide_, goal_, vary_, at_] = SECTIONS;
+    let [name, world, robot_, executor_, agent_, queue_, wires_, decide_, goal_, vary_, at_] = SECTIONS;
     let properties = object([
         (name, json!({"type": "string", "description": "The name of the system."})),
         (world, world_()),
         (robot_, named(robot(registry.get("robot")), "The robots.")),
         (executor_, named(executor(), "Threads besides the usual ones, or in their place.")),
         (agent_, named(json!({"anyOf": agents}), "The agents.")),
+        (queue_, named(queue(), "Mailboxes that several inputs share.")),
         (wires_, wires()),
         (decide_, decide()),
         (goal_, goal()),
@@ -44,7 +45,7 @@ pub fn schema(registry: &Registry) -> Json {
                 "pattern": "^\\s*[-+0-9.eE]+\\s*(ns|us|ms|s|min|h)$",
                 "description": "A time: a number and one of ns, us, ms, s, min, h."
             },
-            "port": {"type": "string", "pattern": "^.+\\..+$", "description": "An agent and its port, as in sonar.filtered."},
+            "port": {"type": "string", "pattern": "^.+$", "description": "An agent and its port, as in sonar.filtered, or a queue."},
         },
     })
 }
@@ -208,13 +209,27 @@ fn executor() -> Json {
     closed([("priority", priority), ("cpus", cpus), ("spin", spin)], &[])
 }
 
+const POLICIES: [Overload; 3] = [Overload::NewestWins, Overload::OldestWins, Overload::Refuse];
+
+fn queue() -> Json {
+    let depth = json!({"type": "integer", "minimum": 1,
+        "description": "How many messages of one sender and one priority wait at most."});
+    let overload = choice(POLICIES.map(Overload::name), "What happens when there is no room.");
+    closed([("depth", depth), ("overload", overload)], &[])
+}
+
 fn wires() -> Json {
     let whole = |least: i64, doc: &str| json!({"type": "integer", "minimum": least, "description": doc});
-    let policies = [Overload::NewestWins, Overload::OldestWins, Overload::Refuse].map(Overload::name);
+    let policies = POLICIES.map(Overload::name);
     let rows = [
         ("to", json!({"$ref": "#/$defs/port"})),
         ("depth", whole(1, "How many messages wait at most.")),
         ("overload", choice(policies, "What happens when there is no room.")),
+        (
+            "serving",
+            json!({"type": "integer", "minimum": 0, "maximum": runtime::MOST_SERVING,
+            "description": "Out of a queue: who is called first; the highest."}),
+        ),
         ("every", whole(0, "Only every n-th message passes.")),
         ("priority", choice(Priority::ALL.map(Priority::name), "Only this priority or a higher one passes.")),
         ("marker", whole(0, "Only this marker passes.")),

@@ -3,8 +3,11 @@
 use types::value::{Mistake, Span};
 
 use crate::agent::{AgentType, Registry};
+use crate::message_type::MessageType;
 use crate::plan::{AgentPlan, ExecutorPlan, Plan, WirePlan};
 use crate::port::Direction;
+use crate::queue_plan::{QueueSide, check_wire, other_type, serving_elsewhere};
+use crate::request::Refusal;
 use crate::router::{robot_wires, timing_of};
 
 /// All mistakes of a plan, in the order of the file as far as places are known.
@@ -12,6 +15,7 @@ pub fn check(plan: &Plan, registry: &Registry) -> Vec<Mistake> {
     let mut checker = Checker { plan, registry, mistakes: Vec::new() };
     checker.executors();
     checker.agents();
+    checker.queues();
     for wire in &plan.wires {
         checker.wire(wire);
     }
@@ -130,12 +134,71 @@ impl<'a> Checker<'a> {
         Some((agent, kind, place?))
     }
 
+    fn queues(&mut self) {
+        for (i, queue) in self.plan.queues.iter().enumerate() {
+            let name = &queue.name;
+            if self.plan.queues[..i].iter().any(|other| other.name == *name) {
+                self.say(queue.at, format!("there are two queues \"{name}\""));
+            }
+            if self.plan.agent(name).is_some() {
+                self.say(queue.at, format!("\"{name}\" is an agent and a queue; names are given once"));
+            }
+            if let Err(refusal) = queue.check() {
+                self.refuse(queue.at, refusal);
+            }
+        }
+    }
+
+    fn refuse(&mut self, at: Span, refusal: Refusal) {
+        self.mistakes.push(Mistake { at, what: refusal.what, help: refusal.help });
+    }
+
+    /// What a queue holds: the messages of the first port that is wired to it in the right way.
+    fn holds(&self, queue: &str) -> Option<&'static MessageType> {
+        self.plan.wires.iter().find_map(|wire| {
+            let (port, is_sender) = match queue {
+                _ if wire.to == queue => (&wire.from, true),
+                _ if wire.from == queue => (&wire.to, false),
+                _ => return None,
+            };
+            let (agent, port) = port.rsplit_once('.')?;
+            let shape = self.registry.get(&self.plan.agent(agent)?.kind)?.port(port)?.shape;
+            let message = if is_sender { shape.output } else { shape.input };
+            message.filter(|message| !message.large)
+        })
+    }
+
+    fn queue_wire(&mut self, wire: &WirePlan, side: QueueSide) {
+        let (queue, port) = match side {
+            QueueSide::Into => (&wire.to, &wire.from),
+            QueueSide::OutOf => (&wire.from, &wire.to),
+        };
+        let Some((_, kind, at)) = self.end(port, wire.at) else { return };
+        let shape = &kind.ports[at].shape;
+        let mut checked = check_wire(wire, side, shape);
+        let message = if side == QueueSide::Into { shape.output } else { shape.input };
+        if let (Some(message), Some(holds)) = (message, self.holds(queue))
+            && holds != message
+        {
+            checked = checked.and(Err(other_type(queue, holds, port, message)));
+        }
+        if let Err(refusal) = checked {
+            self.refuse(wire.at, refusal);
+        }
+    }
+
     fn wire(&mut self, wire: &WirePlan) {
         if let Some(name) = &wire.filter.recipient
             && self.plan.agent(name).is_none()
         {
             let known = self.plan.agents.iter().map(|agent| agent.name.as_str());
             self.mistakes.push(Mistake::unknown(wire.at, "agent", name, known));
+        }
+        match self.plan.queue_side(wire) {
+            Ok(None) if wire.serving.is_some() => self.refuse(wire.at, serving_elsewhere(wire)),
+            Ok(None) => {}
+            Ok(Some(side)) => return self.queue_wire(wire, side),
+            Err(refusal) => return self.refuse(wire.at, refusal),
         }
         let (from, to) = (self.end(&wire.from, wire.at), self.end(&wire.to, wire.at));
         let (Some((_, out_kind, out)), Some((_, in_kind, into))) = (from, to) else { return };

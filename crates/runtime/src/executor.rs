@@ -5,6 +5,7 @@
 
 mod change;
 mod ready;
+mod serving;
 mod step;
 
 use std::any::Any;
@@ -21,7 +22,7 @@ use crate::agent::{Body, Fault};
 use crate::door::{CHANGES, Door};
 use crate::handover::Running;
 use crate::os;
-use crate::port::InputEnd;
+use crate::port::{InputEnd, Rest};
 use crate::processor::{Checks, rate};
 use crate::ring::{self, ring};
 use crate::stats::{AgentStats, bump};
@@ -45,6 +46,8 @@ pub(crate) struct Seat {
     pub body: Option<Box<dyn Body>>,
     /// The inputs whose messages make it run.
     pub on: Vec<Arc<dyn InputEnd>>,
+    /// Whether any of them takes messages out of a queue.
+    pub serves: bool,
     pub timing: Timing,
     pub stats: Arc<AgentStats>,
     pub next_release: Time,
@@ -207,11 +210,8 @@ impl Core {
     fn answer_door(&mut self) -> bool {
         let bits = self.door.take();
         for slot in 0..self.seats.len() as u32 {
-            if bits & crate::door::bit_of(slot) != 0
-                && let Some(seat) = &self.seats[slot as usize]
-                && seat.on.iter().any(|input| input.has_message())
-            {
-                self.ready.mark(slot);
+            if bits & crate::door::bit_of(slot) != 0 {
+                self.find_whether_ready(slot);
             }
         }
         bits & CHANGES != 0
@@ -220,12 +220,16 @@ impl Core {
     /// Finds ready agents by looking into the mailboxes: after a hand-over, when nobody knows what was rung.
     #[inline(never)]
     pub(crate) fn find_ready(&mut self) {
-        for slot in 0..self.seats.len() as u32 {
-            if let Some(seat) = &self.seats[slot as usize]
-                && seat.on.iter().any(|input| input.has_message())
-            {
-                self.ready.mark(slot);
-            }
+        (0..self.seats.len() as u32).for_each(|slot| self.find_whether_ready(slot));
+    }
+
+    fn find_whether_ready(&mut self, slot: u32) {
+        let Some(seat) = &self.seats[slot as usize] else { return };
+        if seat.on.iter().any(|input| input.has_message()) {
+            self.ready.mark(slot);
+        } else {
+            // Where it serves a queue and was called, another one was there first.
+            self.rest_at_queues(slot, Rest::Ready);
         }
     }
 
@@ -273,6 +277,7 @@ impl Core {
             seat.put_off = earliest;
             self.push_release(earliest, slot);
         }
+        self.rest_at_queues(slot, Rest::Away);
         true
     }
 
@@ -302,8 +307,12 @@ impl Core {
                 seat.alarm = Time::NEVER;
             }
             if seat.put_off <= now {
-                release = release.or(Some(seat.put_off));
-                seat.put_off = Time::NEVER;
+                let put_off = core::mem::replace(&mut seat.put_off, Time::NEVER);
+                if release.is_none() && seat.lost_to_others() {
+                    self.rest_at_queues(slot, Rest::Ready);
+                    continue;
+                }
+                release = release.or(Some(put_off));
             }
             if let Some(release) = release
                 && let Some(rank) = self.ready.rank_of(slot)
@@ -335,7 +344,7 @@ impl Core {
     pub(crate) fn give_up(&mut self, slot: u32, now: Time) {
         let Some(seat) = self.seats.get_mut(slot as usize).and_then(Option::as_mut) else { return };
         bump(&seat.stats.hangs);
-        seat.lost = true;
+        (seat.lost, seat.serves) = (true, false);
         seat.on.clear();
         let cause = if self.changing.is_some() { RawCause::Stop } else { RawCause::Hang };
         let died = Answer::Died { slot, id: seat.id, time: now, cause, body: seat.body.take() };

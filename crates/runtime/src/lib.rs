@@ -49,6 +49,19 @@
 //! let report = Simulation::new(&plan, &registry![Source, Sink], options).unwrap().run().unwrap();
 //! assert_eq!(report.view.agents[1].counts.releases, 101);
 //! ```
+//!
+//! Several inputs can share a mailbox: a [`Queue`]. Each message in it goes to one of them, and of those that wait the one of highest
+//! priority is called; [`Plan::queue`] makes one. In a system file:
+//!
+//! ```toml
+//! [queue.work]
+//! depth = 32                          # of each sender and priority; "refuse" when it is full
+//!
+//! [wires]
+//! "finder.work" = ["work"]
+//! "sorter.work" = ["work"]
+//! work = ["fast.work", { to = "slow.work", serving = 10 }]
+//! ```
 
 // Derived code names the crate from outside.
 #[cfg(test)]
@@ -70,6 +83,8 @@ mod os;
 mod plan;
 mod port;
 mod processor;
+mod queue;
+mod queue_plan;
 mod request;
 mod ring;
 mod router;
@@ -102,9 +117,10 @@ pub use port::{
     Direction, Envelope, Input, Output, OutputFault, Port, PortEnds, PortOptions, PortShape, PortVisit,
     Received, Sent, WireCounts, WireId,
 };
+pub use queue_plan::{MOST_SERVING, Queue, QueuePlan};
 pub use request::{
-    AgentState, AgentView, Counts, ExecutorView, FaultKind, PortView, Refusal, Request, SystemView,
-    WireTotals, WireView,
+    AgentState, AgentView, Counts, ExecutorView, FaultKind, PortView, QueueView, ReceiverView, Refusal,
+    Request, SystemView, WireTotals, WireView,
 };
 pub use ring::{MOST_MESSAGES, Overload};
 pub use router::{Incident, ServiceShape, robot_wires};

@@ -6,6 +6,7 @@ use types::value::{Mistake, Span, Table, Value};
 use types::{AgentId, Category, Duration, Filter, Message};
 
 use crate::agent::{ClientEnd, Declare, InputEnd as To, OutputEnd as From, ServiceEnd};
+use crate::queue_plan::{Queue, QueuePlan};
 use crate::ring::Overload;
 
 /// The one value that describes a system: agents, wires, executors, what happens when, and the sections of others.
@@ -17,7 +18,9 @@ pub struct Plan {
     pub executors: Vec<ExecutorPlan>,
     /// Agents, in the order in which they are added.
     pub agents: Vec<AgentPlan>,
-    /// Wires.
+    /// Queues.
+    pub queues: Vec<QueuePlan>,
+    /// Wires, into queues and out of them too.
     pub wires: Vec<WirePlan>,
     /// What is asked of the running system at certain times.
     pub requests: Vec<TimedRequest>,
@@ -84,9 +87,9 @@ pub struct AgentPlan {
 /// A wire in a plan.
 #[derive(Clone, Debug, PartialEq)]
 pub struct WirePlan {
-    /// The output, as in `sonar.filtered`; for calls the client.
+    /// The output, as in `sonar.filtered`; for calls the client. Or a queue.
     pub from: String,
-    /// The input, as in `safety.ranges`; for calls the service.
+    /// The input, as in `safety.ranges`; for calls the service. Or a queue.
     pub to: String,
     /// How many messages wait at most; the usual depth when nothing is said.
     pub depth: Option<usize>,
@@ -94,6 +97,9 @@ pub struct WirePlan {
     pub overload: Option<Overload>,
     /// Which messages pass.
     pub filter: WireFilter,
+    /// Out of a queue: who is served first, from 0 to 99; the priority of the receiver's executor when nothing is said, which is 0
+    /// for an ordinary one.
+    pub serving: Option<u8>,
     /// Where it is written.
     pub at: Span,
 }
@@ -142,7 +148,8 @@ impl WirePlan {
     /// A wire with the usual depth and policy.
     pub fn new(from: impl Into<String>, to: impl Into<String>) -> WirePlan {
         let (from, to) = (from.into(), to.into());
-        WirePlan { from, to, depth: None, overload: None, filter: WireFilter::default(), at: Span::default() }
+        let (filter, at) = (WireFilter::default(), Span::default());
+        WirePlan { from, to, depth: None, overload: None, filter, serving: None, at }
     }
 }
 
@@ -213,6 +220,51 @@ impl Plan {
         self.wires.push(WirePlan::new(from, to));
     }
 
+    /// Adds a queue of messages of type `T`, to be wired like a port: outputs into it, and it into inputs.
+    ///
+    /// ```
+    /// use runtime::{Agent, Fault, Input, Output, Plan, Step};
+    /// use types::messages::Twist;
+    ///
+    /// # #[derive(Agent)]
+    /// # struct Finder {
+    /// #     /// What is to be done.
+    /// #     work: Output<Twist>,
+    /// # }
+    /// # impl Agent for Finder {
+    /// #     fn step(&mut self, _: &mut Step) -> Result<(), Fault> { Ok(()) }
+    /// # }
+    /// # #[derive(Agent)]
+    /// # struct Worker {
+    /// #     /// What is to be done.
+    /// #     work: Input<Twist>,
+    /// # }
+    /// # impl Agent for Worker {
+    /// #     fn step(&mut self, _: &mut Step) -> Result<(), Fault> { Ok(()) }
+    /// # }
+    /// let mut plan = Plan::new("yard");
+    /// let finder = plan.add::<Finder>("finder", Default::default());
+    /// let (one, two) = (plan.add::<Worker>("one", Default::default()), plan.add::<Worker>("two", Default::default()));
+    /// let work = plan.queue::<Twist>("work");
+    /// plan.wire(&finder.work, &work);
+    /// plan.wire(&work, &one.work);
+    /// plan.wire(&work, &two.work);
+    /// ```
+    pub fn queue<T: Message>(&mut self, name: &str) -> Queue<T> {
+        self.queues.push(QueuePlan::new(name));
+        Queue::new(name)
+    }
+
+    /// The queue with this name, to change it.
+    pub fn queue_mut(&mut self, name: &str) -> Option<&mut QueuePlan> {
+        self.queues.iter_mut().find(|queue| queue.name == name)
+    }
+
+    /// Whether this is the name of a queue.
+    pub fn is_queue(&self, name: &str) -> bool {
+        self.queues.iter().any(|queue| queue.name == name)
+    }
+
     /// The agent with this name, to change it.
     pub fn agent_mut(&mut self, name: &str) -> Option<&mut AgentPlan> {
         self.agents.iter_mut().find(|agent| agent.name == name)
@@ -254,7 +306,11 @@ impl Plan {
             self.sections.get("robot").and_then(|entry| entry.value.as_table()).cloned().unwrap_or_default();
         let kept = |name: &str| names.iter().any(|kept| kept == name) || robots.get(name).is_some();
         self.agents.retain(|agent| kept(&agent.name));
-        self.wires.retain(|wire| kept(owner(&wire.from)) && kept(owner(&wire.to)));
+        let queues: Vec<String> = self.queues.iter().map(|queue| queue.name.clone()).collect();
+        let end = |name: &str| kept(owner(name)) || queues.iter().any(|queue| queue == name);
+        self.wires.retain(|wire| end(&wire.from) && end(&wire.to));
+        let wires = &self.wires;
+        self.queues.retain(|queue| wires.iter().any(|wire| wire.from == queue.name || wire.to == queue.name));
         Ok(())
     }
 }

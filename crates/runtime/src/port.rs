@@ -6,6 +6,7 @@
 mod faulty;
 mod input;
 mod output;
+mod queue;
 
 use core::sync::atomic::{AtomicU64, Ordering};
 use std::any::Any;
@@ -188,6 +189,14 @@ pub(crate) trait InputEnd: Any + Send + Sync {
     fn has_message(&self) -> bool;
     /// After a step: what it did with the messages that waited.
     fn settle(&self) -> Settled;
+    /// Before a step of an agent that takes messages out of a queue: nobody counts on it meanwhile.
+    fn begin_step(&self);
+    /// Whether it takes messages out of a queue.
+    fn serves(&self) -> bool;
+    /// Comes to rest between two steps. Says whether a message waits for which the agent is to run again at once.
+    fn rest(&self, why: Rest, teller: &mut Teller<'_>) -> bool;
+    /// A queue of such messages; nothing where they are large.
+    fn queue(&self, form: QueueForm) -> Option<Arc<dyn QueueEnd>>;
     fn message_type(&self) -> &'static MessageType;
     /// An output of the same type that belongs to no agent: for a caller from outside.
     fn facing(&self) -> Arc<dyn OutputEnd>;
@@ -228,6 +237,8 @@ pub(crate) trait OutputEnd: Any + Send + Sync {
     fn send_prepared(&self, envelope: &Envelope, message: &(dyn Any + Send));
     /// An input of the same type that belongs to no agent: for a caller from outside.
     fn facing(&self) -> Arc<dyn InputEnd>;
+    /// A queue of such messages; nothing where they are large.
+    fn queue(&self, form: QueueForm) -> Option<Arc<dyn QueueEnd>>;
 }
 
 /// How an output misbehaves on request.
@@ -262,3 +273,4 @@ pub use input::{Input, Received};
 pub(crate) use input::{InputCore, downcast_input, input_core};
 pub use output::{Envelope, Output, Sent};
 pub(crate) use output::{OutputCore, downcast_output, output_core};
+pub(crate) use queue::{QueueEnd, QueueForm, QueueWire, Rest, Teller};

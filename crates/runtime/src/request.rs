@@ -9,6 +9,7 @@ use types::{AgentId, Duration, Time};
 use crate::executor::StepFault;
 use crate::plan::{AgentPlan, WireFilter, WirePlan};
 use crate::port::{Direction, OutputFault, WireCounts};
+use crate::queue_plan::QueuePlan;
 use crate::ring::Overload;
 use crate::stats::Figure;
 
@@ -17,7 +18,9 @@ use crate::stats::Figure;
 pub enum Request {
     /// Adds an agent, wired to its robot where the plan says so.
     Add(AgentPlan),
-    /// Removes an agent and its wires.
+    /// Adds a queue, to be wired.
+    Queue(QueuePlan),
+    /// Removes an agent and its wires; or a queue that holds nothing and that nobody is wired to.
     Remove(String),
     /// Starts an agent anew.
     Restart(String),
@@ -374,6 +377,42 @@ impl core::ops::AddAssign for WireTotals {
     }
 }
 
+/// What a running system says of a queue.
+#[derive(Clone, Debug)]
+pub struct QueueView {
+    /// Its name.
+    pub name: String,
+    /// What it holds; nothing before anybody is wired to it.
+    pub message: &'static str,
+    /// How many messages of one sender and one priority wait at most.
+    pub depth: usize,
+    /// What happens when there is no room.
+    pub overload: Overload,
+    /// Messages that wait.
+    pub waiting: usize,
+    /// Messages put into it, by senders that are gone too.
+    pub sent: u64,
+    /// Messages that were displaced or dropped.
+    pub dropped: u64,
+    /// Messages that were given back.
+    pub refused: u64,
+    /// Messages taken out of it, by receivers that are gone too.
+    pub taken: u64,
+    /// Who takes them.
+    pub receivers: Vec<ReceiverView>,
+}
+
+/// What a running system says of an input that takes messages out of a queue.
+#[derive(Clone, Debug)]
+pub struct ReceiverView {
+    /// The input.
+    pub to: String,
+    /// Who is served first; the highest.
+    pub serving: u8,
+    /// Messages that it took.
+    pub taken: u64,
+}
+
 /// What a running system says of an executor.
 #[derive(Clone, Debug)]
 pub struct ExecutorView {
@@ -398,8 +437,10 @@ pub struct SystemView {
     pub allocations_watched: bool,
     /// Its agents.
     pub agents: Vec<AgentView>,
-    /// Its wires.
+    /// Its queues.
+    pub queues: Vec<QueueView>,
+    /// Its wires, to and from queues too: there messages are sent on the one and taken on the other.
     pub wires: Vec<WireView>,
-    /// What went over wires that are cut. What is on its way still is not among it.
+    /// What went over wires that are cut. What is on its way still is not among it, nor what a queue counts that is there still.
     pub past: WireTotals,
 }

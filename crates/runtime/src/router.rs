@@ -12,6 +12,7 @@ mod agents;
 mod calls;
 mod deaths;
 mod order;
+mod queues;
 mod requests;
 mod script;
 mod staged;
@@ -32,6 +33,7 @@ use crate::log::{LogChoice, LogShared};
 use crate::names::Directory;
 use crate::plan::{AgentPlan, ExecutorPlan, WireFilter, WirePlan};
 use crate::port::{Direction, InputEnd, OutputEnd, OutputFault, PortEnds, WireCounts, WireId};
+use crate::queue_plan::QueuePlan;
 use crate::request::{AgentState, Refusal, WireTotals};
 use crate::ring::Overload;
 use crate::stats::AgentStats;
@@ -180,6 +182,7 @@ pub(crate) struct Router {
     agents: BTreeMap<AgentId, Known>,
     names: HashMap<String, AgentId>,
     wires: BTreeMap<WireId, Wire>,
+    queues: Vec<queues::Queue>,
     pub executors: Vec<ExecutorKnown>,
     added: u64,
     next_wire: u32,
@@ -221,6 +224,7 @@ impl Router {
             agents: BTreeMap::new(),
             names: HashMap::new(),
             wires: BTreeMap::new(),
+            queues: Vec::new(),
             executors,
             added: 0,
             next_wire: 0,
@@ -356,11 +360,12 @@ impl Router {
     }
 
     /// The running system as a plan that would start it.
-    pub(crate) fn to_plan(&self) -> (Vec<AgentPlan>, Vec<WirePlan>) {
+    pub(crate) fn to_plan(&self) -> (Vec<AgentPlan>, Vec<QueuePlan>, Vec<WirePlan>) {
         let agents = self.in_order().into_iter();
         let agents = agents.map(|known| AgentPlan { params: known.params.clone(), ..known.plan.clone() });
         let wires = self.wires.values().filter(|wire| !wire.is_answer).map(|wire| self.plan_of(wire));
-        (agents.collect(), wires.collect())
+        let (queues, to_queues) = self.plans_of_queues();
+        (agents.collect(), queues, wires.chain(to_queues).collect())
     }
 }
 

@@ -226,7 +226,13 @@ impl Player {
                     let core = &mut self.cores[at];
                     // Changes are served where they are given.
                     let _ = core.look_at_door();
-                    let Some(job) = core.next(self.now) else { break };
+                    let Some(job) = core.next(self.now) else {
+                        // One that must wait has passed a call on.
+                        if self.is_rung_before(place) {
+                            continue 'again;
+                        }
+                        break;
+                    };
                     let mut moment = Moment::simulated(self.now);
                     // SAFETY: the core lives in this thread's own array, and nobody else takes it.
                     let ended = unsafe { Core::run(core, &self.context, job, &mut moment, None, || true) };
@@ -249,6 +255,11 @@ impl Player {
             }
             return Ok(());
         }
+    }
+
+    /// Whether somebody has rung at an executor that goes before this one and is not kept busy.
+    fn is_rung_before(&self, place: usize) -> bool {
+        self.order[..place].iter().any(|at| self.blocked[*at] <= self.now && self.cores[*at].door.is_rung())
     }
 
     /// An agent is stuck in virtual time: its executor does nothing until the watchdog has given it up.

@@ -153,6 +153,10 @@ mod explored {
                     turn();
                     self.0.fetch_or(value, ordering)
                 }
+                pub(crate) fn fetch_and(&self, value: $number, ordering: Ordering) -> $number {
+                    turn();
+                    self.0.fetch_and(value, ordering)
+                }
                 pub(crate) fn fetch_sub(&self, value: $number, ordering: Ordering) -> $number {
                     turn();
                     self.0.fetch_sub(value, ordering)

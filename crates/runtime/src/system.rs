@@ -12,6 +12,7 @@ use crate::executor::Core;
 use crate::log::{LogChoice, Recorder};
 use crate::names::Directory;
 use crate::plan::{AgentPlan, Plan, WirePlan};
+use crate::queue_plan::QueuePlan;
 use crate::request::{Refusal, Request, SystemView};
 use crate::router::{ExecutorKnown, Fabric, Incident, OutsideCall, Router, ServiceShape, Staged};
 use crate::tap::Tap;
@@ -20,7 +21,7 @@ use crate::tap::Tap;
 pub(crate) enum Ask {
     Request(Box<Request>, SyncSender<Result<(), Refusal>>),
     View(SyncSender<SystemView>),
-    Plan(SyncSender<(Vec<AgentPlan>, Vec<WirePlan>)>),
+    Plan(SyncSender<(Vec<AgentPlan>, Vec<QueuePlan>, Vec<WirePlan>)>),
     Service(String, SyncSender<Result<ServiceShape, Refusal>>),
     Call(OutsideCall),
     Tap(String, SyncSender<Result<Tap, Refusal>>),
@@ -54,8 +55,8 @@ impl Control {
         self.ask(Ask::View)
     }
 
-    /// The agents and wires that run, as a plan would give them.
-    pub fn plan(&self) -> Result<(Vec<AgentPlan>, Vec<WirePlan>), Refusal> {
+    /// The agents, queues and wires that run, as a plan would give them.
+    pub fn plan(&self) -> Result<(Vec<AgentPlan>, Vec<QueuePlan>, Vec<WirePlan>), Refusal> {
         self.ask(Ask::Plan)
     }
 
@@ -254,6 +255,9 @@ pub(crate) fn build(plan: &Plan, registry: &Registry, log: LogChoice, now: Time)
         });
         let readers: Vec<usize> = readers.collect();
         router.add(agent.clone(), &readers, &mut staged).map_err(CannotRun::Refused)?;
+    }
+    for queue in &plan.queues {
+        router.add_queue(queue.clone(), &mut staged).map_err(CannotRun::Refused)?;
     }
     for wire in &wires {
         router.wire(wire, &mut staged).map_err(CannotRun::Refused)?;

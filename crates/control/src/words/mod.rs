@@ -2,8 +2,9 @@
 //!
 //! ```text
 //! add NAME is KIND [robot=…] [period=…] [on=a,b] [deadline=…] … [KEY=VALUE…]
+//! add NAME is queue [depth=N] [overload=POLICY]
 //! remove NAME            restart NAME           replace NAME is KIND [KEY=VALUE…]
-//! wire FROM TO [depth=N] [overload=POLICY] [every=N] [priority=LEAST] [marker=N] [category=…] [recipient=AGENT]
+//! wire FROM TO [depth=N] [overload=POLICY] [every=N] [priority=LEAST] [marker=N] [category=…] [recipient=AGENT] [serving=N]
 //! unwire FROM TO         set NAME KEY=VALUE…    fault TARGET KIND
 //! send PORT cdr=HEX      quit
 //! ```
@@ -37,14 +38,15 @@ const fn usage(verb: &'static str, form: &'static str, does: &'static str) -> Us
 }
 
 /// The requests that change a running system: what [`parse`] reads.
-pub const CHANGES: [Usage; 10] = [
+pub const CHANGES: [Usage; 11] = [
     usage("add", "add NAME is KIND [robot=…] [period=…] [on=…] [KEY=VALUE…]", "adds an agent"),
-    usage("remove", "remove NAME", "removes an agent and its wires"),
+    usage("add", "add NAME is queue [depth=N] [overload=…]", "adds a queue"),
+    usage("remove", "remove NAME", "removes an agent and its wires; or a queue that nobody needs"),
     usage("restart", "restart NAME", "starts an agent anew"),
     usage("replace", "replace NAME is KIND [KEY=VALUE…]", "puts another agent in the place of one"),
     usage(
         "wire",
-        "wire FROM TO [depth=N] [overload=…] [every=N] [priority=…] [marker=N] [category=…]",
+        "wire FROM TO [depth=N] [overload=…] [every=N] [priority=…] [marker=N] [category=…] [serving=N]",
         "makes a wire",
     ),
     usage("unwire", "unwire FROM TO", "cuts a wire, when what is on it has arrived"),
@@ -61,8 +63,11 @@ pub const AND: &str = ";";
 pub(crate) const MOST_PAIRS: usize = 4096;
 
 /// The keys of `wire`.
-pub(crate) const WIRE_KEYS: [&str; 7] =
-    ["depth", "overload", "every", "priority", "marker", "category", "recipient"];
+pub(crate) const WIRE_KEYS: [&str; 8] =
+    ["depth", "overload", "every", "priority", "marker", "category", "recipient", "serving"];
+
+/// What stands in the place of a type of agent where a queue is added.
+pub(crate) const QUEUE: &str = "queue";
 
 #[cfg(test)]
 mod tests;

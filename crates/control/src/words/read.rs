@@ -2,12 +2,12 @@
 
 use std::str::FromStr;
 
-use runtime::{AgentPlan, FaultKind, OnDeath, Overload, Refusal, Request, WirePlan};
+use runtime::{AgentPlan, FaultKind, OnDeath, Overload, QueuePlan, Refusal, Request, WirePlan};
 use types::header::LeastPriority;
 use types::value::Table;
 use types::{Category, Duration, Priority};
 
-use super::{AND, CHANGES, MOST_PAIRS, WIRE_KEYS, read_value};
+use super::{AND, CHANGES, MOST_PAIRS, QUEUE, WIRE_KEYS, read_value};
 
 /// Longer than anything that robots do. Several such times can be added and each taken four times without an overflow.
 const LONGEST: Duration = Duration::secs(10 * 365 * 24 * 3600);
@@ -49,6 +49,7 @@ fn nothing() -> Refusal {
 fn read_one(words: &[String]) -> Read<Request> {
     let Some((verb, rest)) = words.split_first() else { return Err(nothing()) };
     match verb.as_str() {
+        "add" if rest.get(2).is_some_and(|kind| kind == QUEUE) => read_queue(rest).map(Request::Queue),
         "add" => read_add(rest).map(Request::Add),
         "remove" => only(verb, rest).map(|[agent]| Request::Remove(agent)),
         "restart" => only(verb, rest).map(|[agent]| Request::Restart(agent)),
@@ -131,6 +132,17 @@ fn read_add(words: &[String]) -> Read<AgentPlan> {
     Ok(plan)
 }
 
+/// A queue is added as an agent is.
+fn read_queue(words: &[String]) -> Read<QueuePlan> {
+    let (name, _, mut pairs) = name_is_kind("add", words)?;
+    let mut plan = QueuePlan::new(name);
+    plan.depth = pairs.number("depth")?;
+    let policies = [Overload::NewestWins, Overload::OldestWins, Overload::Refuse].map(Overload::name);
+    plan.overload = pairs.named("overload", Overload::named, &policies)?;
+    pairs.finish("a queue", &["depth", "overload"])?;
+    Ok(plan)
+}
+
 fn read_range(text: &str) -> Read<(Duration, Duration)> {
     let (least, most) = text.split_once("..").ok_or_else(|| {
         Refusal::new(format!("period_range is \"{text}\"")).help("write it as in \"50ms..1s\"")
@@ -152,6 +164,7 @@ fn read_wire(words: &[String]) -> Read<WirePlan> {
     let mut pairs = Pairs::read("wire", rest)?;
     let mut plan = WirePlan::new(from, to);
     plan.depth = pairs.number("depth")?;
+    plan.serving = pairs.number("serving")?;
     plan.filter.every = pairs.number("every")?.unwrap_or_default();
     plan.filter.marker = pairs.number("marker")?;
     plan.filter.recipient = pairs.take("recipient").map(str::to_owned);

@@ -3,7 +3,7 @@
 use proptest::collection::vec;
 use proptest::option;
 use proptest::prelude::*;
-use runtime::{AgentPlan, FaultKind, OnDeath, Overload, Request, WireFilter, WirePlan};
+use runtime::{AgentPlan, FaultKind, OnDeath, Overload, QueuePlan, Request, WireFilter, WirePlan};
 use types::header::LeastPriority;
 use types::value::{Table, Value};
 use types::{Category, Duration, Priority};
@@ -103,6 +103,8 @@ fn what_is_refused_says_how_to_mend_it() {
             "wire a.b c.d overload=newest",
             "there is no overload \"newest\"; it can be: newest-wins, oldest-wins, refuse",
         ),
+        ("add work is queue dept=3", "there is no option of a queue \"dept\"; did you mean \"depth\"?"),
+        ("wire work c.d serving=256", "serving must be a whole number that is not negative, not \"256\""),
         ("wire a.b c.d depth=3 depth=4", "\"depth\" is said twice"),
         ("add a is b on_death=leavee", "there is no policy on death \"leavee\"; did you mean \"leave\"?"),
         ("add a is b period_range=1s", "period_range is \"1s\"; write it as in \"50ms..1s\""),
@@ -175,20 +177,31 @@ prop_compose! {
 }
 
 prop_compose! {
+    fn a_queue()(
+        (name, depth) in (name(), option::of(any::<usize>())),
+        overload in option::of(prop::sample::select(vec![Overload::NewestWins, Overload::OldestWins, Overload::Refuse])),
+    ) -> QueuePlan {
+        QueuePlan { depth, overload, ..QueuePlan::new(name) }
+    }
+}
+
+prop_compose! {
     fn a_wire()(
         (from, to, depth) in (port(), port(), option::of(any::<usize>())),
         overload in option::of(prop::sample::select(vec![Overload::NewestWins, Overload::OldestWins, Overload::Refuse])),
         (category, priority) in (option::of(prop::sample::select(&Category::ALL[..])), prop::sample::select(&Priority::ALL[..])),
         (marker, recipient, every) in (option::of(any::<u32>()), option::of(name()), prop_oneof![0..3u32, any::<u32>()]),
+        serving in option::of(any::<u8>()),
     ) -> WirePlan {
         let filter = WireFilter { category, least_priority: LeastPriority(priority), marker, recipient, every };
-        WirePlan { depth, overload, filter, ..WirePlan::new(from, to) }
+        WirePlan { depth, overload, filter, serving, ..WirePlan::new(from, to) }
     }
 }
 
 fn single() -> impl Strategy<Value = Request> {
     prop_oneof![
         agent().prop_map(Request::Add),
+        a_queue().prop_map(Request::Queue),
         name().prop_map(Request::Remove),
         name().prop_map(Request::Restart),
         (name(), name(), params()).prop_map(|(agent, kind, params)| Request::Replace { agent, kind, params }),

@@ -1,10 +1,10 @@
 //! From a request to words.
 
-use runtime::{AgentPlan, OnDeath, Request, WirePlan};
+use runtime::{AgentPlan, OnDeath, QueuePlan, Request, WirePlan};
 use types::value::Table;
 use types::{Duration, Priority};
 
-use super::{AND, write_value};
+use super::{AND, QUEUE, write_value};
 
 /// The words that [`parse`](super::parse) reads as this request. Requests of several within requests of several become one row:
 /// they are done together all the same.
@@ -13,6 +13,7 @@ use super::{AND, write_value};
 pub fn words_of(request: &Request) -> Vec<String> {
     match request {
         Request::Add(plan) => add(plan),
+        Request::Queue(plan) => queue(plan),
         Request::Remove(agent) => words(["remove", agent]),
         Request::Restart(agent) => words(["restart", agent]),
         Request::Replace { agent, kind, params } => {
@@ -65,6 +66,13 @@ fn add(plan: &AgentPlan) -> Vec<String> {
     out
 }
 
+fn queue(plan: &QueuePlan) -> Vec<String> {
+    let mut out = words(["add", &plan.name, "is", QUEUE]);
+    push(&mut out, "depth", plan.depth);
+    push(&mut out, "overload", plan.overload.map(|policy| policy.name()));
+    out
+}
+
 fn wire(plan: &WirePlan) -> Vec<String> {
     let mut out = words(["wire", &plan.from, &plan.to]);
     let filter = &plan.filter;
@@ -76,5 +84,6 @@ fn wire(plan: &WirePlan) -> Vec<String> {
     push(&mut out, "marker", filter.marker);
     push(&mut out, "category", filter.category.map(|category| category.name()));
     push(&mut out, "recipient", filter.recipient.as_ref());
+    push(&mut out, "serving", plan.serving);
     out
 }

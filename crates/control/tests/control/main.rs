@@ -88,8 +88,12 @@ fn what_is_asked_is_done() {
     let ls = client.call(&["ls"]).unwrap();
     assert_eq!(agent(&ls, "source")["params"]["by"], 3.0);
     assert_eq!(agent(&ls, "source")["period_s"], 0.01);
-    let (agents, wires) = shapes::read_plan(&client.call(&["plan"]).unwrap()).unwrap();
-    assert_eq!((agents, wires), lab.control.plan().unwrap());
+    client.call(&["add", "work", "is", "queue", "depth=3"]).unwrap();
+    client.call(&["wire", "source.out", "work"]).unwrap();
+    client.call(&["wire", "work", "more.count", "serving=7"]).unwrap();
+    let parts = shapes::read_plan(&client.call(&["plan"]).unwrap()).unwrap();
+    assert_eq!(parts, lab.control.plan().unwrap());
+    assert_eq!(client.call(&["ls"]).unwrap()["queues"][0]["receivers"][0]["serving"], 7);
     assert_eq!(
         client.call(&["latch"]).unwrap(),
         json!({"asked": ["latch"]}),

@@ -9,7 +9,7 @@ use super::read::{Reader, unknown};
 use super::tree;
 
 /// The sections of a file that is used as a group.
-const SECTIONS: [&str; 5] = ["name", "executor", "agent", "wires", "ports"];
+const SECTIONS: [&str; 6] = ["name", "executor", "agent", "queue", "wires", "ports"];
 /// Groups within groups within groups.
 const DEEPEST: usize = 8;
 
@@ -80,6 +80,7 @@ impl Reader<'_> {
         chain.push(shown);
         self.executors(&tree);
         self.agents(&tree, &prefix, &inside, robot, chain);
+        self.queues(&tree, &prefix);
         self.collect_wires(&tree, &prefix);
         self.ports(&tree, &prefix);
         chain.pop();

@@ -15,8 +15,8 @@ use super::wires::Written;
 use super::{decide, set, tree};
 
 /// The sections of a system file.
-pub(crate) const SECTIONS: [&str; 10] =
-    ["name", "world", "robot", "executor", "agent", "wires", "decide", "goal", "vary", "at"];
+pub(crate) const SECTIONS: [&str; 11] =
+    ["name", "world", "robot", "executor", "agent", "queue", "wires", "decide", "goal", "vary", "at"];
 /// Longer than anything that robots do. Several such times can be added and each taken four times without an overflow.
 const LONGEST: Duration = Duration::secs(10 * 365 * 24 * 3600);
 /// The agent type that a robot is.
@@ -172,6 +172,7 @@ impl<'r> Reader<'r> {
         let folder = self.folder.clone();
         self.agents(tree, "", &folder, None, &mut Vec::new());
         self.settle_executors();
+        self.queues(tree, "");
         self.collect_wires(tree, "");
         self.settle_wires();
         self.requests(tree);

@@ -1,6 +1,6 @@
 //! `[wires]`: from each output to its inputs.
 
-use runtime::{Overload, WireFilter, WirePlan};
+use runtime::{Overload, QueuePlan, WireFilter, WirePlan};
 use types::value::{Entry, Mistake, Span, Table, TableReader, Value, nearest};
 use types::{Category, Priority};
 
@@ -15,6 +15,19 @@ pub(super) struct Written {
 }
 
 impl Reader<'_> {
+    /// Takes the queues of a file; those inside a group get its prefix.
+    pub(super) fn queues(&mut self, tree: &Table, prefix: &str) {
+        for (name, at, table) in self.each(tree, "queue") {
+            self.check_name(name, at);
+            let mut r = TableReader::new(table, at, format!("queue \"{name}\""));
+            let mut queue = QueuePlan { at, ..QueuePlan::new(format!("{prefix}{name}")) };
+            queue.depth = whole(&mut r, "depth", 1, runtime::MOST_MESSAGES as i64).map(|n| n as usize);
+            queue.overload = policy(&mut r);
+            r.finish(&mut self.mistakes);
+            self.plan.queues.push(queue);
+        }
+    }
+
     /// Takes the wires of a file; names inside a group get its prefix.
     pub(super) fn collect_wires(&mut self, tree: &Table, prefix: &str) {
         let Some(entry) = tree.get("wires") else { return };
@@ -76,8 +89,8 @@ impl Reader<'_> {
         let to = r.required_text("to", "the input it leads to");
         let place = r.place("to");
         wire.depth = whole(&mut r, "depth", 1, runtime::MOST_MESSAGES as i64).map(|n| n as usize);
-        let policies = [Overload::NewestWins, Overload::OldestWins, Overload::Refuse].map(Overload::name);
-        wire.overload = word(&mut r, "overload", "overload policy", &policies, Overload::named);
+        wire.overload = policy(&mut r);
+        wire.serving = whole(&mut r, "serving", 0, runtime::MOST_SERVING.into()).map(|n| n as u8);
         wire.filter = WireFilter {
             every: whole(&mut r, "every", 0, u32::MAX.into()).unwrap_or(0) as u32,
             marker: whole(&mut r, "marker", 0, u32::MAX.into()).map(|n| n as u32),
@@ -119,9 +132,12 @@ impl Reader<'_> {
     /// The full name of the port that `name` means; none, and said why, when there is none.
     pub(super) fn end(&mut self, name: &str, at: Span) -> Option<String> {
         let name = self.names.resolve(name);
+        if self.plan.is_queue(name) {
+            return Some(name.to_owned());
+        }
         let Some((agent, port)) = name.rsplit_once('.') else {
             let what = format!("\"{name}\" is no port");
-            self.mistakes.push(Mistake::new(at, what).help("write agent and port, as in \"sonar.filtered\""));
+            self.mistakes.push(Mistake::new(at, what).help(self.no_port_help(name)));
             return None;
         };
         if self.names.is_group(agent) {
@@ -146,6 +162,16 @@ impl Reader<'_> {
             return None;
         }
         Some(name.to_owned())
+    }
+
+    /// What to write in the place of a name that is no port: the nearest queue, if there are any.
+    fn no_port_help(&self, name: &str) -> String {
+        let queues: Vec<&str> = self.plan.queues.iter().map(|queue| queue.name.as_str()).collect();
+        match nearest(name, queues.iter().copied()) {
+            Some(right) => format!("did you mean the queue \"{right}\"?"),
+            None if queues.is_empty() => "write agent and port, as in \"sonar.filtered\"".to_owned(),
+            None => format!("write agent and port, or a queue: {}", queues.join(", ")),
+        }
     }
 
     /// There is no agent of this name.
@@ -173,6 +199,11 @@ fn flatten(table: &Table, prefix: &str, prefix_at: Span, rows: &mut Vec<(String,
             _ => rows.push((name, at, row.entry.clone())),
         }
     }
+}
+
+fn policy(r: &mut TableReader<'_>) -> Option<Overload> {
+    let policies = [Overload::NewestWins, Overload::OldestWins, Overload::Refuse].map(Overload::name);
+    word(r, "overload", "overload policy", &policies, Overload::named)
 }
 
 fn whole(r: &mut TableReader<'_>, key: &str, least: i64, most: i64) -> Option<i64> {

@@ -2,7 +2,7 @@
 
 use std::fmt::{self, Write as _};
 
-use runtime::{AgentPlan, ExecutorPlan, OnDeath, Plan, TimedRequest, WireFilter, WirePlan};
+use runtime::{AgentPlan, ExecutorPlan, OnDeath, Plan, QueuePlan, TimedRequest, WireFilter, WirePlan};
 use types::Duration;
 use types::value::{Entry, Key, Table, Value};
 
@@ -46,6 +46,7 @@ fn write(plan: &Plan, out: &mut String) -> fmt::Result {
     for one in plan.agents.iter().filter(|one| !is_robot(one)) {
         agent(one, decisions.is_some(), out)?;
     }
+    plan.queues.iter().try_for_each(|one| queue(one, out))?;
     wires(&plan.wires, out)?;
     if let Some(table) = decisions {
         section("decide", table, out)?;
@@ -147,6 +148,17 @@ fn agent(agent: &AgentPlan, decides: bool, out: &mut String) -> fmt::Result {
     Ok(())
 }
 
+fn queue(queue: &QueuePlan, out: &mut String) -> fmt::Result {
+    writeln!(out, "\n[queue.{}]", Key(&queue.name))?;
+    if let Some(depth) = queue.depth {
+        writeln!(out, "depth = {depth}")?;
+    }
+    if let Some(overload) = queue.overload {
+        writeln!(out, "overload = {}", Value::from(overload.name()))?;
+    }
+    Ok(())
+}
+
 fn wires(wires: &[WirePlan], out: &mut String) -> fmt::Result {
     if wires.is_empty() {
         return Ok(());
@@ -173,6 +185,9 @@ fn target(wire: &WirePlan) -> Value {
     }
     if let Some(overload) = overload {
         table.set("overload", Value::from(overload.name()));
+    }
+    if let Some(serving) = wire.serving {
+        table.set("serving", Value::Int(serving.into()));
     }
     if filter.every != 0 {
         table.set("every", Value::from(filter.every));

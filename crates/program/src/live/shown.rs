@@ -48,7 +48,30 @@ pub(super) fn ls(answer: &Json) -> String {
     for agent in rows(answer, "agents").filter(|agent| !agent["last_death"].is_null()) {
         let _ = writeln!(out, "  {} died last: {}", text(&agent["name"]), text(&agent["last_death"]));
     }
+    queues(answer, &mut out);
     out
+}
+
+/// Queues with what waits in them, and who takes it.
+fn queues(answer: &Json, out: &mut String) {
+    for queue in rows(answer, "queues") {
+        let _ = write!(out, "{} (queue", text(&queue["name"]));
+        if !queue["message"].is_null() {
+            let _ = write!(out, " of {}", text(&queue["message"]));
+        }
+        let _ =
+            write!(out, "): {} waiting, {} sent, {} taken", queue["waiting"], queue["sent"], queue["taken"]);
+        for (key, word) in [("dropped", "dropped"), ("refused", "given back")] {
+            if queue[key].as_u64().is_some_and(|count| count > 0) {
+                let _ = write!(out, ", {} {word}", queue[key]);
+            }
+        }
+        let _ = writeln!(out);
+        for to in rows(queue, "receivers") {
+            let (port, serving, taken) = (text(&to["to"]), &to["serving"], &to["taken"]);
+            let _ = writeln!(out, "  {} → {port}  serving {serving}, {taken} taken", text(&queue["name"]));
+        }
+    }
 }
 
 /// Agents with what leads out of them.
@@ -76,6 +99,7 @@ pub(super) fn graph(answer: &Json) -> String {
             let _ = writeln!(out, "{line}");
         }
     }
+    queues(answer, &mut out);
     out
 }
 
@@ -92,10 +116,15 @@ pub(super) fn dot(answer: &Json) -> String {
             quoted(&format!("{}\n{}", text(&agent["name"]), text(&agent["kind"])).into())
         );
     }
+    for queue in rows(answer, "queues") {
+        let _ = writeln!(out, "  {} [shape = cds];", quoted(&queue["name"]));
+    }
+    let is_queue = |name: &str| rows(answer, "queues").any(|queue| queue["name"] == *name);
     for wire in rows(answer, "wires") {
         let (from, to) = (text(&wire["from"]), text(&wire["to"]));
         let label = |port: &str| port.rsplit_once('.').map_or(port.to_owned(), |(_, port)| port.to_owned());
-        let ends = [runtime::owner(&from), runtime::owner(&to)].map(|agent| quoted(&agent.into()));
+        let end = |name: &str| if is_queue(name) { name.to_owned() } else { runtime::owner(name).to_owned() };
+        let ends = [end(&from), end(&to)].map(|agent| quoted(&agent.into()));
         let _ = writeln!(
             out,
             "  {} -> {} [taillabel = {}, headlabel = {}];",

@@ -11,7 +11,9 @@ use control::{Hooks, Server};
 use hardware::Latch;
 use hardware::latch::Cause;
 use record::{dynamic, schema::Schema};
-use runtime::{AgentPlan, Control, Overload, Plan, Refusal, Registry, Request, RunFolder, WirePlan};
+use runtime::{
+    AgentPlan, Control, Overload, Plan, QueuePlan, Refusal, Registry, Request, RunFolder, WirePlan,
+};
 use serde_json::{Value as Json, json};
 use types::definition::Definition;
 use types::message::Message as _;
@@ -144,7 +146,8 @@ impl RunHooks {
 
     /// The plan as it is now. Wires that follow from the robot of an agent are not written: they come back by themselves.
     fn running(&self) -> Result<Plan, Refusal> {
-        let (agents, wires) = self.control.plan()?;
+        let (agents, queues, wires) = self.control.plan()?;
+        let queues = queues.into_iter().map(usual_queue).collect();
         let own = |agent: &AgentPlan| {
             let (robot, kind) = (agent.robot.as_ref()?, self.registry.get(&agent.kind)?);
             Some(runtime::robot_wires(agent, kind, robot))
@@ -153,7 +156,7 @@ impl RunHooks {
         let is_implied =
             |wire: &WirePlan| implied.iter().any(|own| own.from == wire.from && own.to == wire.to);
         let wires = wires.into_iter().filter(|wire| !is_implied(wire)).map(usual).collect();
-        Ok(Plan { agents, wires, ..self.plan.clone() })
+        Ok(Plan { agents, queues, wires, ..self.plan.clone() })
     }
 
     fn robots(&self) -> Result<(), Refusal> {
@@ -239,6 +242,13 @@ fn usual(mut wire: WirePlan) -> WirePlan {
         (wire.depth, wire.overload) = (None, None);
     }
     wire
+}
+
+/// The same for a queue.
+fn usual_queue(mut queue: QueuePlan) -> QueuePlan {
+    queue.depth = queue.depth.filter(|depth| *depth != runtime::USUAL_DEPTH_ON);
+    queue.overload = queue.overload.filter(|policy| *policy != Overload::Refuse);
+    queue
 }
 
 /// Of a row with more values than this the rest is left out: nobody reads the pixels of a picture.

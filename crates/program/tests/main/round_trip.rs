@@ -2,7 +2,9 @@
 
 use program::file::{self, Shelf, read_plan, write_plan};
 use proptest::prelude::*;
-use runtime::{AgentPlan, ExecutorPlan, OnDeath, Overload, Plan, TimedRequest, WireFilter, WirePlan};
+use runtime::{
+    AgentPlan, ExecutorPlan, OnDeath, Overload, Plan, QueuePlan, TimedRequest, WireFilter, WirePlan,
+};
 use types::value::{Span, Table, Value};
 use types::{Category, Duration, Priority};
 
@@ -14,6 +16,7 @@ fn bare(mut plan: Plan) -> Plan {
     plan.executors.iter_mut().for_each(|executor| executor.at = Span::default());
     plan.requests.iter_mut().for_each(|request| request.place = Span::default());
     plan.wires.iter_mut().for_each(|wire| wire.at = Span::default());
+    plan.queues.iter_mut().for_each(|queue| queue.at = Span::default());
     let outputs: Vec<String> = plan.wires.iter().map(|wire| wire.from.clone()).collect();
     plan.wires.sort_by_key(|wire| outputs.iter().position(|output| *output == wire.from));
     plan
@@ -76,6 +79,50 @@ fn what_the_file_says_is_in_the_plan() {
     let request = &plan.requests[0];
     assert_eq!((request.at, request.words.join(" ").as_str()), (Duration::secs(40), "fault h1.sonar off"));
     assert_eq!(plan.sections.get("world").unwrap().value, Value::from("laboratory"));
+}
+
+#[test]
+fn a_queue_is_read_with_the_wires_to_it_and_from_it() {
+    let text = r#"
+        name = "shared"
+        [agent.eyes]
+        is = "sonar"
+        on = "echoes"
+        [agent.left]
+        is = "safety-monitor"
+        on = "ranges"
+        [agent.right]
+        is = "safety-monitor"
+        on = "ranges"
+        [queue.seen]
+        depth = 8
+        overload = "oldest-wins"
+        [wires]
+        "eyes.filtered" = ["seen"]
+        seen = ["left.ranges", { to = "right.ranges", serving = 80 }]
+    "#;
+    let plan = read_plan(text, "shared.toml", &registry()).unwrap_or_else(|mistakes| panic!("{mistakes}"));
+    let queue = &plan.queues[0];
+    assert_eq!((queue.name.as_str(), queue.depth(), queue.overload()), ("seen", 8, Overload::OldestWins));
+    let wires: Vec<_> = plan.wires.iter().map(|wire| (&*wire.from, &*wire.to, wire.serving)).collect();
+    let expected =
+        [("eyes.filtered", "seen", None), ("seen", "left.ranges", None), ("seen", "right.ranges", Some(80))];
+    assert_eq!(wires, expected);
+    assert_eq!(again(&plan), bare(plan));
+
+    for (right, wrong, said) in [
+        ("[\"seen\"]", "[\"sen\"]", "\"sen\" is no port\n"),
+        ("[\"seen\"]", "[\"sen\"]", "did you mean the queue \"seen\"?"),
+        ("serving = 80", "serving = 100", "\"serving\" is 100, it must lie from 0 to 99"),
+        ("right.ranges", "left.ranges", "there are two wires from seen to left.ranges"),
+        ("[\"seen\"]", "[{ to = \"seen\", depth = 3 }]", "depth and overload are those of queue \"seen\""),
+        ("\"left.ranges\"", "{ to = \"left.ranges\", every = 2 }", "has a filter"),
+        ("eyes.filtered", "left.safety", "queue \"seen\" holds SafetyState, left.ranges has"),
+    ] {
+        let text = text.replacen(right, wrong, 1);
+        let mistakes = read_plan(&text, "shared.toml", &registry()).unwrap_err().to_string();
+        assert!(mistakes.contains(said), "{mistakes}");
+    }
 }
 
 #[test]
@@ -179,9 +226,18 @@ fn wire(to: String) -> impl Strategy<Value = WirePlan> {
     )
 }
 
+fn queue() -> impl Strategy<Value = (QueuePlan, Option<u8>)> {
+    let policies = vec![None, Some(Overload::NewestWins), Some(Overload::OldestWins), Some(Overload::Refuse)];
+    let parts = (proptest::option::of(1usize..1000), proptest::sample::select(policies), any::<Option<u8>>());
+    parts.prop_map(|(depth, overload, serving)| {
+        (QueuePlan { depth, overload, ..QueuePlan::new("seen") }, serving)
+    })
+}
+
 fn plans() -> impl Strategy<Value = Plan> {
-    let whole = (executors(), agents(), "\\PC{0,12}", proptest::option::of(times()));
-    whole.prop_flat_map(|(executors, mut agents, name, time)| {
+    let whole =
+        (executors(), agents(), "\\PC{0,12}", proptest::option::of(times()), proptest::option::of(queue()));
+    whole.prop_flat_map(|(executors, mut agents, name, time, queue)| {
         let wires: Vec<_> = agents.iter().map(|agent| wire(format!("{}.ranges", agent.name))).collect();
         agents.push(AgentPlan {
             name: "eyes".into(),
@@ -189,6 +245,17 @@ fn plans() -> impl Strategy<Value = Plan> {
             on: vec!["echoes".into()],
             ..AgentPlan::default()
         });
+        let mut queued = Vec::new();
+        let mut queues = Vec::new();
+        if let Some((queue, serving)) = queue {
+            queued.push(WirePlan::new("eyes.filtered", queue.name.clone()));
+            let inputs = agents.iter().filter(|agent| agent.name != "eyes");
+            queued.extend(inputs.map(|agent| {
+                let serving = serving.map(|serving| serving % (1 + runtime::MOST_SERVING));
+                WirePlan { serving, ..WirePlan::new(queue.name.clone(), format!("{}.ranges", agent.name)) }
+            }));
+            queues.push(queue);
+        }
         let requests = time.map(|at| TimedRequest {
             at,
             words: ["fault", agents[0].name.as_str(), "slow"].map(str::to_owned).to_vec(),
@@ -198,7 +265,8 @@ fn plans() -> impl Strategy<Value = Plan> {
             name: name.clone(),
             executors: executors.clone(),
             agents: agents.clone(),
-            wires,
+            queues: queues.clone(),
+            wires: wires.into_iter().chain(queued.clone()).collect(),
             requests: requests.iter().cloned().collect(),
             sections: Table::new(),
         })

@@ -17,7 +17,7 @@ use crate::context::Context;
 use crate::door::Door;
 use crate::handover::Running;
 use crate::os;
-use crate::port::{Envelope, InputEnd, OutputEnd, WireId};
+use crate::port::{Envelope, InputEnd, OutputEnd, Rest, WireId};
 use crate::ring;
 use crate::stats::{bump, bump_by};
 use crate::sync::{Ordering, light_barrier};
@@ -276,6 +276,7 @@ impl Core {
                         self.push_release(now, *slot);
                     }
                     *seat = self.seats[*slot as usize].replace(new);
+                    self.note_serving(*slot);
                 }
             }
             Change::Order { order, ranks, words, releases, due } => {
@@ -290,12 +291,18 @@ impl Core {
                     core::mem::swap(due, &mut self.due);
                 }
             }
-            Change::Join { end, lanes, .. } => end.join(lanes.as_mut()),
-            Change::Leave { end, wire, into, force, .. } => {
+            Change::Join { end, lanes, slot } => {
+                end.join(lanes.as_mut());
+                if self.note_serving(*slot) {
+                    self.rest_at_queues(*slot, Rest::Ready);
+                }
+            }
+            Change::Leave { end, wire, into, force, slot } => {
                 if !*force && !end.is_drained(*wire) {
                     return false;
                 }
                 end.leave(*wire, into.as_mut());
+                self.note_serving(*slot);
             }
             Change::Route { end, route, .. } => end.add_route(route.as_mut()),
             Change::Forget { end, wire, into, .. } => end.forget(*wire, into.as_mut()),
@@ -310,6 +317,7 @@ impl Core {
                 if let Some(seat) = self.seats.get_mut(*slot as usize).and_then(Option::as_mut) {
                     seat.fault = *fault;
                 }
+                self.rest_at_queues(*slot, Rest::Ready);
             }
             Change::OutputFault { end, faulty, .. } => end.set_fault(faulty.as_mut()),
             Change::Send { end, message, envelope, .. } => {
@@ -543,7 +551,10 @@ impl Visit<'_> {
         for input in &seat.on {
             has_message |= input.settle().left;
         }
-        if has_message {
+        if seat.serves {
+            let why = if seat.body.is_some() { Rest::Ready } else { Rest::Away };
+            core.rest(slot, why);
+        } else if has_message {
             core.ready.mark(slot);
         }
         Some(lives)

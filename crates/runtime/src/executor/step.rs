@@ -15,6 +15,7 @@ use crate::agent::{Body, Fault, Step};
 use crate::allocations;
 use crate::context::Context;
 use crate::os;
+use crate::port::Rest;
 use crate::processor::{Moment, Stopwatch, agrees, scaled};
 use crate::stats::{bump, bump_by, nanos};
 use crate::sync::{Ordering, light_barrier};
@@ -63,6 +64,7 @@ impl Core {
                     Err(ended) => {
                         seat.body = Some(body);
                         running.limit.store(seat.timing.hang_after.0 as u64, Ordering::Relaxed);
+                        core.not_made(job.slot, &ended);
                         return Some(ended);
                     }
                 };
@@ -75,6 +77,9 @@ impl Core {
             let step =
                 Step { now: begun.time, deadline: job.deadline, agent: seat.id, period: seat.timing.period };
             context.begin(seat.id, begun.time, core.number);
+            if seat.serves {
+                seat.begin_serving();
+            }
             let checked = watch.and_then(|_| core.checks.begin(begun.time));
             running.limit.store(seat.timing.hang_after.0 as u64, Ordering::Relaxed);
             running.since.store(begun.reading.ticks, Ordering::Relaxed);
@@ -140,7 +145,9 @@ impl Core {
             took |= settled.took;
             left |= settled.left;
         }
-        if took && left {
+        if seat.serves {
+            core.rest(job.slot, Rest::Stepped(took));
+        } else if took && left {
             core.ready.mark(job.slot);
         }
         core.note_allocations((before - entered) + (allocations::so_far() - after));
@@ -234,7 +241,10 @@ impl Core {
                 RawCause::Panic(context.panic_record(), payload)
             }
         };
-        let id = seat.id;
+        let (id, serves) = (seat.id, seat.serves);
+        if serves {
+            self.rest(slot, Rest::Away);
+        }
         self.answer(Answer::Died { slot, id, time, cause, body: Some(body) });
     }
 }

@@ -9,24 +9,27 @@ use std::sync::Arc;
 use types::cdr::{NoElement, Writer};
 use types::{Header, Message, Priority, Time};
 
+use super::queue::{QueueEnd, QueueForm, Rest, Teller, queue_core};
 use super::{
     Direction, InputEnd, OutputEnd, Parcel, Port, PortEnds, PortOptions, PortShape, Settled, WireCounts,
     WireId, count, output_core,
 };
 use crate::memory::{Found, Link, Pin, Seat};
 use crate::message_type::MessageType;
-use crate::ring;
+use crate::{queue, ring};
 
 pub(super) enum Source<T: Message> {
     Value(ring::Receiver<Parcel<T>>),
     Link(ring::Receiver<Parcel<Link>>, Seat<T>),
+    Queue(queue::Receiver<Parcel<T>>),
 }
 
 impl<T: Message> Source<T> {
-    fn advance(&mut self) -> bool {
+    pub(super) fn advance(&mut self) -> bool {
         match self {
             Source::Value(receiver) => receiver.advance(),
             Source::Link(receiver, _) => receiver.advance(),
+            Source::Queue(receiver) => receiver.advance(),
         }
     }
 
@@ -34,13 +37,15 @@ impl<T: Message> Source<T> {
         match self {
             Source::Value(receiver) => receiver.has_message(),
             Source::Link(receiver, _) => receiver.has_message(),
+            Source::Queue(receiver) => receiver.has_message(),
         }
     }
 
-    fn header(&self) -> &Header {
+    pub(super) fn header(&self) -> &Header {
         match self {
             Source::Value(receiver) => &receiver.current().header,
             Source::Link(receiver, _) => &receiver.current().header,
+            Source::Queue(receiver) => &receiver.current().header,
         }
     }
 }
@@ -60,8 +65,10 @@ pub(super) struct NewLanes<T: Message> {
     pub(super) room: Vec<Lane<T>>,
 }
 
-struct InputInner<T: Message> {
-    lanes: Vec<Lane<T>>,
+pub(super) struct InputInner<T: Message> {
+    pub(super) lanes: Vec<Lane<T>>,
+    /// Whether any lane is one of a queue.
+    serves: bool,
     taken: u64,
     /// How many had been taken after the last step.
     settled: u64,
@@ -98,6 +105,7 @@ impl<T: Message> InputEnd for InputCore<T> {
             core::mem::swap(&mut new.room, &mut inner.lanes);
         }
         inner.lanes.append(&mut new.lanes);
+        inner.count_queues();
     }
 
     fn is_drained(&self, wire: WireId) -> bool {
@@ -105,7 +113,8 @@ impl<T: Message> InputEnd for InputCore<T> {
             .lanes
             .iter()
             .filter(|lane| lane.wire == wire)
-            .all(|lane| !lane.staged && !lane.source.has_message())
+            // What waits in a queue waits there for others.
+            .all(|lane| matches!(lane.source, Source::Queue(_)) || !lane.staged && !lane.source.has_message())
     }
 
     fn leave(&self, wire: WireId, into: &mut (dyn Any + Send)) {
@@ -120,6 +129,7 @@ impl<T: Message> InputEnd for InputCore<T> {
             }
         }
         self.inner().last = None;
+        self.inner().count_queues();
     }
 
     fn leaving_box(&self) -> Box<dyn Any + Send> {
@@ -138,6 +148,28 @@ impl<T: Message> InputEnd for InputCore<T> {
             return Settled { took, left: *staged || receiver.has_message() };
         }
         Settled { took, left: inner.has_message() }
+    }
+
+    fn begin_step(&self) {
+        let inner = self.inner();
+        if inner.serves {
+            inner.begin_step();
+        }
+    }
+
+    fn serves(&self) -> bool {
+        self.inner().serves
+    }
+
+    fn rest(&self, why: Rest, teller: &mut Teller<'_>) -> bool {
+        let inner = self.inner();
+        let again = inner.serves && inner.rest_at_queues(why, teller);
+        let looks = matches!(why, Rest::Stepped(true) | Rest::Ready);
+        again || looks && inner.lanes.iter().any(Lane::has_own_message)
+    }
+
+    fn queue(&self, form: QueueForm) -> Option<Arc<dyn QueueEnd>> {
+        queue_core::<T>(form)
     }
 
     fn message_type(&self) -> &'static MessageType {
@@ -267,7 +299,7 @@ impl<T: Message> Input<T> {
     pub fn at(&self, time: Time) -> Option<Found<T>> {
         self.core.as_ref()?.inner().lanes.iter().find_map(|lane| match &lane.source {
             Source::Link(_, seat) => seat.at(time),
-            Source::Value(_) => None,
+            Source::Value(_) | Source::Queue(_) => None,
         })
     }
 }
@@ -293,12 +325,19 @@ impl<T: Message> InputInner<T> {
         self.lanes.iter().any(|lane| lane.staged || lane.source.has_message())
     }
 
+    fn count_queues(&mut self) {
+        self.serves = self.lanes.iter().any(|lane| matches!(lane.source, Source::Queue(_)));
+    }
+
     /// The lane whose front is next, staged and marked as given.
     #[inline]
     fn next(&mut self) -> Option<usize> {
         if let [lane] = &mut self.lanes[..] {
             let given = core::mem::take(&mut lane.staged) || lane.source.advance();
             return given.then_some(0);
+        }
+        if self.serves {
+            return self.next_with_queues();
         }
         let mut best: Option<usize> = None;
         for i in 0..self.lanes.len() {
@@ -324,6 +363,11 @@ fn before(a: &Header, b: &Header) -> bool {
 }
 
 impl<T: Message> Lane<T> {
+    /// Whether a message waits that nobody else can take.
+    fn has_own_message(&self) -> bool {
+        self.staged || !matches!(self.source, Source::Queue(_)) && self.source.has_message()
+    }
+
     /// What was taken last, read in place and counted.
     fn current(&self) -> Option<Received<'_, T>> {
         let received = self.read();
@@ -342,6 +386,10 @@ impl<T: Message> Lane<T> {
                 let pin = seat.pin(parcel.payload)?;
                 Some(Received { header: &parcel.header, place: Place::Pinned(pin) })
             }
+            Source::Queue(receiver) => {
+                let parcel = receiver.current();
+                Some(Received { header: &parcel.header, place: Place::Value(&parcel.payload) })
+            }
         }
     }
 }
@@ -349,7 +397,13 @@ impl<T: Message> Lane<T> {
 /// Makes the mailbox of an input of type `T`.
 pub(crate) fn input_core<T: Message>() -> Arc<InputCore<T>> {
     Arc::new(InputCore {
-        inner: UnsafeCell::new(InputInner { lanes: Vec::new(), taken: 0, settled: 0, last: None }),
+        inner: UnsafeCell::new(InputInner {
+            lanes: Vec::new(),
+            serves: false,
+            taken: 0,
+            settled: 0,
+            last: None,
+        }),
     })
 }
 

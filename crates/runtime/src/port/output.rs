@@ -14,6 +14,7 @@ use types::{AgentId, Category, Filter, Header, Message, Priority, Time};
 
 use super::faulty::Faulty;
 use super::input::{Lane, NewLanes, Source};
+use super::queue::{QueueEnd, QueueForm, queue_core};
 use super::{
     Direction, InputEnd, NoSeat, OutputEnd, OutputFault, Parcel, Port, PortEnds, PortOptions, PortShape,
     PreparedWire, Target, WireCounts, WireId, WireSpec, count, input_core,
@@ -21,23 +22,26 @@ use super::{
 use crate::context::{Context, current};
 use crate::memory::{self, Link, Seat};
 use crate::message_type::{self, MessageType};
+use crate::queue;
 use crate::ring::{self, Overload, Pushed};
 
 /// The sending ends of a wire: a ring for each priority that the output uses.
-struct Route<T: Message> {
-    wire: WireId,
-    filter: Filter,
-    passed: u32,
-    overload: Overload,
-    values: Vec<(Priority, ring::Sender<Parcel<T>>)>,
-    links: Vec<(Priority, ring::Sender<Parcel<Link>>)>,
-    target: Target,
-    counts: Arc<WireCounts>,
+pub(super) struct Route<T: Message> {
+    pub(super) wire: WireId,
+    pub(super) filter: Filter,
+    pub(super) passed: u32,
+    pub(super) overload: Overload,
+    pub(super) values: Vec<(Priority, ring::Sender<Parcel<T>>)>,
+    pub(super) links: Vec<(Priority, ring::Sender<Parcel<Link>>)>,
+    pub(super) target: Target,
+    pub(super) counts: Arc<WireCounts>,
+    /// In the place of the rings where it leads to a queue. It goes last: while somebody counts here its places are not given to others.
+    pub(super) queue: Option<queue::Sender<Parcel<T>>>,
 }
 
-struct NewRoute<T: Message> {
-    route: Option<Route<T>>,
-    room: Vec<Route<T>>,
+pub(super) struct NewRoute<T: Message> {
+    pub(super) route: Option<Route<T>>,
+    pub(super) room: Vec<Route<T>>,
 }
 
 struct OutputInner<T: Message> {
@@ -129,6 +133,7 @@ impl<T: Message> OutputEnd for OutputCore<T> {
             overload: spec.overload,
             values,
             links,
+            queue: None,
             target: spec.target.clone(),
             counts: spec.counts.clone(),
         };
@@ -202,6 +207,10 @@ impl<T: Message> OutputEnd for OutputCore<T> {
 
     fn facing(&self) -> Arc<dyn InputEnd> {
         input_core::<T>()
+    }
+
+    fn queue(&self, form: QueueForm) -> Option<Arc<dyn QueueEnd>> {
+        queue_core::<T>(form)
     }
 }
 
@@ -320,6 +329,7 @@ impl<T: Message> Output<T> {
             core.inner().routes.iter().all(|route| {
                 route.values.iter().all(|(_, ring)| ring.has_room())
                     && route.links.iter().all(|(_, ring)| ring.has_room())
+                    && route.queue.as_ref().is_none_or(queue::Sender::has_room)
             })
         })
     }
@@ -464,8 +474,16 @@ impl<T: Message> OutputCore<T> {
         let (head, row) = loan.parts();
         let len = fill(head, row).min(row.len());
         self.log(header, head, &row[..len], context);
+        if !is_large::<T>() {
+            // Into a queue goes the message itself.
+            for route in inner.routes.iter_mut().filter(|route| route.queue.is_some()) {
+                if route.lets_pass(header) {
+                    route.put_value(header, |place| *place = *head, &mut sent, context);
+                }
+            }
+        }
         let link = loan.publish(*header, len);
-        for route in &mut inner.routes {
+        for route in inner.routes.iter_mut().filter(|route| route.queue.is_none()) {
             if route.lets_pass(header) {
                 route.put_link(header, link, &mut sent, context);
             }
@@ -554,7 +572,7 @@ impl<T: Message> Route<T> {
                 parcel.header = *header;
                 fill(&mut parcel.payload);
             }),
-            None => Pushed::Full,
+            None => self.put_queued(header, fill, context),
         };
         *sent = self.account(pushed, *sent, context);
     }

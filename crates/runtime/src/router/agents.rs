@@ -18,8 +18,8 @@ use crate::stats::AgentStats;
 impl Router {
     /// Adds an agent. `readers` is how many wires the plan leads from each of its ports.
     pub(crate) fn add(&mut self, plan: AgentPlan, readers: &[usize], staged: &mut Staged) -> Reply<AgentId> {
-        if self.names.contains_key(&plan.name) {
-            return Err(Refusal::new(format!("there is already an agent \"{}\"", plan.name))
+        if self.names.contains_key(&plan.name) || self.is_queue(&plan.name) {
+            return Err(Refusal::new(format!("there is already something called \"{}\"", plan.name))
                 .help("names are given once"));
         }
         let kind = self
@@ -97,6 +97,7 @@ impl Router {
             name: Name::new(&known.plan.name),
             body,
             on: known.on(),
+            serves: false,
             timing: known.timing,
             stats: known.stats.clone(),
             next_release: Time::NEVER,
@@ -149,6 +150,9 @@ impl Router {
     }
 
     pub(super) fn remove(&mut self, name: &str, staged: &mut Staged) -> Reply<()> {
+        if self.is_queue(name) {
+            return self.remove_queue(name, staged);
+        }
         let id = self.id_of(name)?;
         if self.robots.iter().any(|robot| robot == name) {
             return Err(Refusal::new(format!(
@@ -163,11 +167,16 @@ impl Router {
             return Err(Refusal::new(format!("the wire from {from} to {to} takes what is for {name}"))
                 .help("cut that wire first"));
         }
+        if let Some(WirePlan { from, to, .. }) = self.queue_wire_for(name, id) {
+            return Err(Refusal::new(format!("the wire from {from} to {to} takes what is for {name}"))
+                .help("cut that wire first"));
+        }
         // First nobody sends to it any more, and it is gone from the wires to others, who take what is on them yet; then it stops.
         for wire in self.agents[&id].wires.iter().copied().collect::<Vec<WireId>>() {
             let receives = self.wires.get(&wire).is_some_and(|wire| wire.to.0 == id);
             self.cut(wire, !receives, staged);
         }
+        self.leave_queues(id, staged);
         let Some(known) = self.agents.remove(&id) else { return Ok(()) };
         self.names.remove(name);
         let (executor, slot) = (known.executor, known.slot);

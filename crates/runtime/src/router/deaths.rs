@@ -93,6 +93,7 @@ impl Router {
         } else if lost {
             // It was removed meanwhile, or that is where it is lost.
             self.abandon(id, &[], is_back);
+            self.abandon_cut_queues(id);
             self.say_of(id, format!("{cause}; it was removed"));
         }
     }
@@ -128,6 +129,8 @@ impl Router {
             known.wires.iter().filter_map(|wire| self.wires.get(wire)).cloned().collect();
         let rings: Vec<WireId> = touching.iter().map(|wire| wire.ring).collect();
         self.abandon(id, &rings, is_back);
+        self.abandon_cut_queues(id);
+        self.abandon_queues(id);
         self.end_calls_of(id, "does not return from its step");
         if let Err(refusal) = self.new_ports(id) {
             self.of_mut(id, |known| known.state = AgentState::Dead);
@@ -163,6 +166,9 @@ impl Router {
             if let Some(listed) = self.wires.get_mut(&old.id) {
                 *listed = wire;
             }
+        }
+        for (plan, refusal) in self.renew_queue_wires(id, &mut steps) {
+            self.say_of(id, format!("the wire from {} to {} is lost: {refusal}", plan.from, plan.to));
         }
         self.begin(steps);
     }

@@ -25,7 +25,7 @@ impl Router {
     }
 
     /// The slots of an executor's agents so that senders stand before receivers; cycles are broken by name.
-    fn data_flow_order(&self, executor: usize) -> Vec<u32> {
+    pub(super) fn data_flow_order(&self, executor: usize) -> Vec<u32> {
         let slots = &self.executors[executor].slots;
         let mut members: Vec<&Known> = slots.iter().flatten().filter_map(|id| self.agents.get(id)).collect();
         members.sort_unstable_by(|a, b| a.plan.name.cmp(&b.plan.name));
@@ -35,18 +35,24 @@ impl Router {
         }
         let mut behind: Vec<Vec<usize>> = vec![Vec::new(); members.len()];
         let mut before = vec![0usize; members.len()];
-        for (a, member) in members.iter().enumerate() {
-            let wires = member.wires.iter().filter_map(|id| self.wires.get(id));
-            for wire in wires.filter(|wire| wire.from.0 == member.id && !wire.is_answer) {
-                if let Some(to) = self.agents.get(&wire.to.0)
-                    && to.executor == executor
-                    && to.id != member.id
-                {
-                    let b = place[to.slot as usize];
-                    behind[a].push(b);
-                    before[b] += 1;
-                }
+        let mut goes_before = |from: &Known, to: AgentId| {
+            if let Some(to) = self.agents.get(&to)
+                && to.executor == executor
+                && to.id != from.id
+            {
+                let (a, b) = (place[from.slot as usize], place[to.slot as usize]);
+                behind[a].push(b);
+                before[b] += 1;
             }
+        };
+        for member in &members {
+            let wires = member.wires.iter().filter_map(|id| self.wires.get(id));
+            let wires = wires.filter(|wire| wire.from.0 == member.id && !wire.is_answer);
+            wires.for_each(|wire| goes_before(member, wire.to.0));
+        }
+        for (from, to) in self.flow_of_queues() {
+            let from = self.agents.get(&from).filter(|from| from.executor == executor);
+            from.into_iter().for_each(|from| goes_before(from, to));
         }
         // The first by name that waits for nobody; in a cycle, the first by name.
         let mut free: BinaryHeap<Reverse<usize>> =

@@ -57,7 +57,7 @@ impl Router {
             }
             Request::Send { port, .. } => executors.extend(of(port)),
             Request::All(requests) => requests.iter().for_each(|request| self.concerned(request, executors)),
-            Request::Quit => {}
+            Request::Queue(_) | Request::Quit => {}
         }
     }
 
@@ -68,6 +68,7 @@ impl Router {
             Request::Remove(agent) => self.remove(&agent, staged),
             Request::Restart(agent) => self.restart_now(&agent, staged),
             Request::Replace { agent, kind, params } => self.replace(&agent, &kind, &params, staged),
+            Request::Queue(plan) => self.add_queue(plan, staged),
             Request::Wire(plan) => self.wire(&plan, staged),
             Request::Unwire { from, to } => self.unwire(&from, &to, staged),
             Request::Set { agent, key, value } => self.set(&agent, &key, value, staged),

@@ -9,6 +9,8 @@ pub(crate) struct Staged {
     pub(super) steps: Vec<Step>,
     /// Executors in which agents are in another order then.
     orders: Vec<usize>,
+    /// Whether queues have other receivers then.
+    ranks: bool,
     undo: Vec<Later>,
     decided: Vec<Later>,
 }
@@ -29,6 +31,11 @@ impl Staged {
         if !self.orders.contains(&executor) {
             self.orders.push(executor);
         }
+    }
+
+    /// Who takes messages out of queues has changed.
+    pub(super) fn rank(&mut self) {
+        self.ranks = true;
     }
 
     /// How to take back what was just done to the registry.
@@ -53,6 +60,9 @@ impl Router {
     /// From here on it will be done. Gives the number of the script that says what is left to do.
     pub(super) fn decide(&mut self, staged: Staged) -> u64 {
         staged.decided.into_iter().for_each(|then| then(self));
+        if staged.ranks || !staged.orders.is_empty() {
+            self.rank_receivers();
+        }
         // The order first: a seat that is due must have its place.
         let mut steps: Vec<Step> =
             staged.orders.into_iter().map(|executor| self.order_step(executor)).collect();

@@ -12,8 +12,7 @@ impl Router {
     /// What there is, as people ask for it.
     pub(crate) fn view(&self, now: Time) -> SystemView {
         let agents = self.in_order().into_iter().map(|known| self.view_agent(known)).collect();
-        let wires =
-            self.wires.values().filter(|wire| !wire.is_answer).map(|wire| self.view_wire(wire)).collect();
+        let wires = self.wires.values().filter(|wire| !wire.is_answer).map(|wire| self.view_wire(wire));
         let executors = self.executors.iter().map(|executor| ExecutorView {
             name: executor.plan.name.clone(),
             real_time: executor.plan.priority.is_some(),
@@ -25,7 +24,8 @@ impl Router {
             executors: executors.collect(),
             allocations_watched: allocations::are_watched(),
             agents,
-            wires,
+            queues: self.view_queues(),
+            wires: wires.chain(self.view_queue_wires()).collect(),
             past: self.past,
         }
     }

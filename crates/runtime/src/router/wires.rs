@@ -32,6 +32,9 @@ impl Router {
 
     /// Makes a wire.
     pub(crate) fn wire(&mut self, plan: &WirePlan, staged: &mut Staged) -> Reply<()> {
+        if let Some(side) = self.queue_side(plan)? {
+            return self.wire_queue(plan, side, staged);
+        }
         let (from, to) = (self.port(&plan.from)?, self.port(&plan.to)?);
         if self.find_wire(from, to).is_some() {
             return Err(Refusal::new(format!("{} is already wired to {}", plan.from, plan.to)));
@@ -189,6 +192,9 @@ impl Router {
     }
 
     pub(super) fn unwire(&mut self, from: &str, to: &str, staged: &mut Staged) -> Reply<()> {
+        if self.is_queue(from) || self.is_queue(to) {
+            return self.unwire_queue(from, to, staged);
+        }
         let (out, into) = (self.port(from)?, self.port(to)?);
         let Some(wire) = self.find_wire(out, into) else {
             let wires = self.agents[&out.0].wires.iter().filter_map(|id| self.wires.get(id));

@@ -7,14 +7,15 @@ mod cuts;
 mod deaths;
 mod fire;
 mod memory;
+mod queues;
 mod stuck;
 mod successor;
 mod thousand;
 mod wall;
 
 use runtime::{
-    Agent, Client, Direction, Envelope, Fault, FaultKind, Input, Options, Output, Params, Plan, Refusal,
-    Registry, Reply, Request, Service, Simulation, Step, TimedRequest, WirePlan, registry,
+    Agent, Client, Direction, Envelope, Fault, FaultKind, Input, Options, Output, Params, Plan, QueuePlan,
+    Refusal, Registry, Reply, Request, Service, Simulation, Step, TimedRequest, WirePlan, registry,
 };
 use std::sync::{Arc, Mutex};
 use types::messages::{Image, Twist};
@@ -115,6 +116,7 @@ fn parse(words: &[String]) -> Result<Request, Refusal> {
             more.iter().for_each(|key| params.set(key, Value::from(true)));
             Request::Replace { agent: agent.into(), kind: kind.into(), params }
         }
+        ["queue", name] => Request::Queue(QueuePlan::new(name)),
         ["remove", agent] => Request::Remove(agent.into()),
         ["restart", agent] => Request::Restart(agent.into()),
         ["unwire", from, to] => Request::Unwire { from: from.into(), to: to.into() },

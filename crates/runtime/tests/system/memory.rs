@@ -93,13 +93,24 @@ fn plan(name: &str) -> Plan {
     plan.wire(&source.out, &relay.from);
     plan.wire(&relay.to, &taker.count);
     plan.wire(&painter.picture, &taker.picture);
+    // The source also sends into a queue that two serve: both are called by others and by each other.
+    let work = plan.queue::<Twist>("work");
+    let other = plan.add::<Taker>("other", Default::default());
+    plan.wire(&source.out, &work);
+    plan.wire(&work, &taker.count);
+    plan.wire(&work, &other.count);
+    plan.on("other", "count");
     plan.every("source", Duration::millis(2));
     plan.every("painter", Duration::millis(5));
     plan.on("relay", "from");
     plan.on("taker", "count");
-    for (agent, executor) in
-        [("source", "reflex"), ("relay", "reflex"), ("painter", "vision"), ("taker", "control")]
-    {
+    for (agent, executor) in [
+        ("source", "reflex"),
+        ("relay", "reflex"),
+        ("painter", "vision"),
+        ("taker", "control"),
+        ("other", "vision"),
+    ] {
         plan.agent_mut(agent).unwrap().executor = Some(executor.into());
     }
     plan
@@ -118,6 +129,20 @@ fn requests() -> Vec<String> {
         "fault relay panic",
         "unwire painter.picture taker.picture",
         "wire painter.picture taker.picture",
+        "unwire work taker.count",
+        "unwire source.out work",
+        "wire source.out work",
+        "wire work taker.count",
+        "fault taker slow",
+        "fault taker off",
+        "fault taker ok",
+        "unwire work other.count",
+        "fault taker panic",
+        "wire work other.count",
+        "restart other",
+        "queue more",
+        "wire source.out more",
+        "wire more other.count",
         "remove relay",
     ]
     .map(str::to_owned)
