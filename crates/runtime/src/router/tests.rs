@@ -1,5 +1,7 @@
 //! The registry and its executors, which serve changes when the test lets them.
 
+#![allow(clippy::unwrap_used)] // a test may
+
 use std::sync::Arc;
 
 use types::messages::Twist;
