@@ -385,7 +385,7 @@ fn a_restart_waits_for_a_neighbour_that_takes_its_time() {
     for _ in 0..5 {
         world.with(0, |router, fabric, now| router.supervise(now, fabric));
         assert_eq!(world.router.known("b").unwrap().state, AgentState::Restarting);
-        world.now = world.now + Duration::secs(3);
+        world.now += Duration::secs(3);
     }
     world.settle();
     let known = world.router.known("b").unwrap();
