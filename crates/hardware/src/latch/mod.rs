@@ -275,7 +275,10 @@ mod model {
 
     /// Two set it, each after something that led to it, while a third resets it; says what the reset found, and the end.
     fn play(check: impl Fn(LatchState, LatchState) + Sync + Send + 'static) {
-        loom::model(move || {
+        // Three threads at will are two minutes; a mistake that takes more than two changes of who runs is one that nobody made yet.
+        let mut model = loom::model::Builder::new();
+        model.preemption_bound = Some(2);
+        model.check(move || {
             let latch = Latch::private();
             let setter = |cause: Cause, at: i64| {
                 let latch = latch.clone();

@@ -9,9 +9,78 @@ use std::io;
 use memmap2::{MmapMut, MmapOptions};
 
 #[cfg(loom)]
-pub(super) use loom::sync::atomic::{AtomicU64, Ordering};
+pub(super) use explored::{AtomicU64, Ordering};
 #[cfg(not(loom))]
 pub(super) use std::sync::atomic::{AtomicU64, Ordering};
+
+/// A word of a model, where every access is a place at which another thread may go on. For `loom` the last access of a thread to a word
+/// hides the ones before, and orders are left out; an access to one word that all share makes it try them all. (The runtime's own shim
+/// does the same, for its own types of words.)
+#[cfg(loom)]
+mod explored {
+    use loom::sync::atomic as plain;
+    pub(crate) use plain::Ordering;
+
+    loom::lazy_static! {
+        static ref TURN: plain::AtomicU32 = plain::AtomicU32::new(0);
+    }
+
+    fn turn() {
+        TURN.fetch_add(1, Ordering::Relaxed);
+    }
+
+    #[derive(Debug)]
+    pub(crate) struct AtomicU64(plain::AtomicU64);
+
+    impl AtomicU64 {
+        pub(crate) fn new(value: u64) -> AtomicU64 {
+            AtomicU64(plain::AtomicU64::new(value))
+        }
+
+        pub(crate) fn load(&self, ordering: Ordering) -> u64 {
+            turn();
+            self.0.load(ordering)
+        }
+
+        pub(crate) fn store(&self, value: u64, ordering: Ordering) {
+            turn();
+            self.0.store(value, ordering);
+        }
+
+        pub(crate) fn fetch_or(&self, value: u64, ordering: Ordering) -> u64 {
+            turn();
+            self.0.fetch_or(value, ordering)
+        }
+
+        pub(crate) fn compare_exchange(
+            &self,
+            from: u64,
+            to: u64,
+            ordering: Ordering,
+            otherwise: Ordering,
+        ) -> Result<u64, u64> {
+            turn();
+            self.0.compare_exchange(from, to, ordering, otherwise)
+        }
+
+        /// As the standard library does it: a load, and an exchange that is tried until nobody came between.
+        pub(crate) fn fetch_update(
+            &self,
+            set: Ordering,
+            fetch: Ordering,
+            mut change: impl FnMut(u64) -> Option<u64>,
+        ) -> Result<u64, u64> {
+            let mut before = self.load(fetch);
+            while let Some(after) = change(before) {
+                match self.compare_exchange(before, after, set, fetch) {
+                    Ok(before) => return Ok(before),
+                    Err(found) => before = found,
+                }
+            }
+            Err(before)
+        }
+    }
+}
 
 /// Bytes of a page. A file of a latch has this length.
 pub(super) const PAGE: usize = 4096;
