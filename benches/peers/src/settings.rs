@@ -81,7 +81,10 @@ mod tests {
     #[test]
     fn options_are_read_and_wrong_ones_are_refused() {
         let read = Settings::read(&["--cpu", "0,1", "--fifo", "80", "--iterations", "5"]).unwrap();
-        assert_eq!(read, Settings { iterations: Some(5), cpus: vec![0, 1], fifo: Some(80), ..Settings::default() });
+        assert_eq!(
+            read,
+            Settings { iterations: Some(5), cpus: vec![0, 1], fifo: Some(80), ..Settings::default() }
+        );
         for (words, expected) in [
             (&["--fifo", "100"][..], "from 1 to 99"),
             (&["--iterations"], "needs a value"),

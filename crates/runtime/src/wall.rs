@@ -6,6 +6,9 @@
 
 #![allow(unsafe_code)]
 
+mod threads;
+mod watchdog;
+
 use core::sync::atomic::{AtomicBool, AtomicI32, AtomicU32, AtomicUsize, Ordering};
 use std::cell::UnsafeCell;
 use std::sync::mpsc::{Receiver, RecvTimeoutError};
@@ -14,18 +17,20 @@ use std::time::Duration as HostDuration;
 
 use types::{Duration, Time};
 
+use self::threads::Threads;
+use self::watchdog::watch;
 use crate::agent::Registry;
 use crate::context::{Context, install_panic_hook};
 use crate::door::{CHANGES, Door};
 use crate::executor::{Core, Ended};
-use crate::handover::{InStep, Owner, Running};
+use crate::handover::{Owner, Running};
 use crate::log::LogThread;
 use crate::names::Directory;
 use crate::os;
 use crate::plan::{ExecutorPlan, Plan};
 use crate::processor::{Processors, Stopwatch};
 use crate::request::{Refusal, Request};
-use crate::router::{Fabric, Incident, OutsideCall, Router};
+use crate::router::{Incident, OutsideCall, Router};
 use crate::sync::Futex;
 use crate::system::{Ask, Built, CannotRun, Control, Options, Report, Verdict, asks, build};
 use crate::trace;
@@ -33,9 +38,6 @@ use crate::witness::Witness;
 
 /// The witness stands above everything, the watchdog next to it.
 const WITNESS_PRIORITY: u8 = 95;
-const WATCHDOG_PRIORITY: u8 = 94;
-/// How often the watchdog looks.
-const WATCHDOG_PERIOD: Duration = Duration::millis(5);
 /// How often the control side looks without being asked.
 const CONTROL_PERIOD: HostDuration = HostDuration::from_millis(10);
 /// The same while somebody outside waits for the answer to a call.
@@ -451,32 +453,6 @@ impl Runner {
     }
 }
 
-/// Serves changes by waking the executor's thread and waiting for it.
-struct Threads<'a> {
-    cells: &'a [Arc<Cell>],
-    /// Since when it is waited.
-    since: Option<i64>,
-}
-
-impl Threads<'_> {
-    fn new(cells: &[Arc<Cell>]) -> Threads<'_> {
-        Threads { cells, since: None }
-    }
-}
-
-impl Fabric for Threads<'_> {
-    fn ring(&mut self, executor: usize) {
-        self.cells[executor].door.ring(CHANGES);
-    }
-
-    fn wait(&mut self) -> bool {
-        let now = os::monotonic();
-        let since = *self.since.get_or_insert(now);
-        std::thread::park_timeout(HostDuration::from_micros(20));
-        now - since < PATIENCE.0
-    }
-}
-
 /// What stands in the word on which a spare thread waits.
 const CALLED: u32 = 1;
 const STOPPED: u32 = 2;
@@ -622,45 +598,4 @@ fn hang(cell: &Cell, number: u32, slot: u32) -> bool {
         core::hint::spin_loop();
     }
     false
-}
-
-/// The watchdog: sees steps that last too long, gives their threads up, and hands what else they ran to the spare ones.
-fn watch(cells: &[Arc<Cell>], over: &AtomicBool, hung: &AtomicU32, can_take: bool) {
-    os::exact_timers();
-    // Without the right to a priority it watches all the same, later.
-    let _ = os::set_fifo(WATCHDOG_PRIORITY);
-    let word = Futex::new(0);
-    let nanos_per_tick = os::nanos_per_tick();
-    while !over.load(Ordering::Acquire) {
-        word.wait(0, Some(os::monotonic() + WATCHDOG_PERIOD.0));
-        for cell in cells {
-            let running = cell.running();
-            let Some(step) = running.in_step() else { continue };
-            let lasts =
-                os::ticks().saturating_sub(running.since.load(Ordering::Acquire)) as f64 * nanos_per_tick;
-            if lasts <= running.limit.load(Ordering::Acquire) as f64 {
-                continue;
-            }
-            if !can_take {
-                hung.store(MOST_HUNG as u32 + 1, Ordering::Relaxed);
-            } else if take_over(cell, step) {
-                hung.fetch_add(1, Ordering::Relaxed);
-            }
-        }
-    }
-}
-
-/// Takes a core away from a thread that does not come back.
-fn take_over(cell: &Cell, step: InStep) -> bool {
-    let no_spare =
-        cell.call.word.load(Ordering::Acquire) != NOBODY || cell.needs_spare.load(Ordering::Acquire);
-    if no_spare || !cell.owner.take_from(cell.running(), step) {
-        return false;
-    }
-    // A failure leaves the thread where it is, at its priority; there is nothing else to be done about it.
-    let _ = os::set_idle(cell.thread.load(Ordering::Acquire));
-    cell.given_up.store(step.slot(), Ordering::Release);
-    cell.call.word.store(CALLED, Ordering::Release);
-    cell.call.wake();
-    true
 }

@@ -36,23 +36,24 @@ pub(super) fn unit(workspace: &Workspace) -> Result<Done, Failure> {
 
 /// With its own build folder: the flag changes every crate, and would spoil the usual one.
 pub(super) fn loom(workspace: &Workspace) -> Result<Done, Failure> {
-    let words = ["test", "--quiet", "--release", "-p", "sinew-runtime", "--lib", "model::"];
+    let words =
+        ["test", "--quiet", "--release", "-p", "sinew-runtime", "-p", "sinew-hardware", "--lib", "model::"];
     let cargo = Tool::cargo(&workspace.root).args(words).flags("RUSTFLAGS", "--cfg loom");
     let cargo = cargo.env("CARGO_TARGET_DIR", workspace.target.join("loom"));
-    let text = cargo.text("Loom found an order of events that breaks a ring or a memory. LOOM_LOG=1 with the same command prints it.")?;
+    let text = cargo.text("Loom found an order of events that breaks a ring, a memory or the latch. LOOM_LOG=1 with the same command prints it.")?;
     print!("{text}");
     let ran: u64 = tests_run(&text);
     if ran == 0 {
         return Err(Failure::new(
             "no model was run",
-            "The models are the modules named `model` in crates/runtime/src.",
+            "The models are the modules named `model` in crates/runtime/src and crates/hardware/src.",
         ));
     }
     Ok(Done::Passed(format!("{ran} models")))
 }
 
 /// The sum of the numbers in lines like `test result: ok. 7 passed; 0 failed`.
-fn tests_run(text: &str) -> u64 {
+pub(super) fn tests_run(text: &str) -> u64 {
     let counts = text
         .lines()
         .filter_map(|line| line.split(" passed;").next()?.rsplit(' ').next()?.parse::<u64>().ok());

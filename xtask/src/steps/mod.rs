@@ -10,9 +10,11 @@ mod log;
 mod new_agent;
 mod recorded;
 mod repeat;
+mod sanitize;
 mod scenarios;
 mod setup;
 mod sinew;
+mod stop;
 
 pub(crate) use lessons::expected_output;
 pub(crate) use setup::{Need, provide};
@@ -40,7 +42,7 @@ pub(crate) struct Step {
 }
 
 /// In the order in which mistakes are cheapest to find.
-pub(crate) const ALL: [Step; 15] = [
+pub(crate) const ALL: [Step; 16] = [
     Step {
         name: "format",
         shows: "every file is as rustfmt writes it",
@@ -67,7 +69,7 @@ pub(crate) const ALL: [Step; 15] = [
     },
     Step {
         name: "loom",
-        shows: "rings and memory under every order of events",
+        shows: "rings, memory and the latch under every order of events",
         needs: &[Need::Compiler],
         run: cargo::loom,
     },
@@ -114,6 +116,12 @@ pub(crate) const ALL: [Step; 15] = [
         run: hardship::run,
     },
     Step {
+        name: "stop",
+        shows: "the emergency stop and signals win on a busy machine",
+        needs: &[Need::Compiler],
+        run: stop::run,
+    },
+    Step {
         name: "recorded",
         shows: "recordings of real robots, where there are any",
         needs: &[Need::Compiler],
@@ -133,6 +141,14 @@ pub(crate) const ALL: [Step; 15] = [
     },
 ];
 
+/// What takes long, or a compiler that not everybody has: only where it is named.
+pub(crate) const MORE: [Step; 1] = [Step {
+    name: "sanitize",
+    shows: "no race between the threads of the runtime (by name only; needs a nightly compiler)",
+    needs: &[Need::Compiler],
+    run: sanitize::run,
+}];
+
 fn check_structure(workspace: &Workspace) -> Result<Done, Failure> {
     tidy::run(workspace)?;
     Ok(Done::Passed(String::new()))
@@ -140,7 +156,7 @@ fn check_structure(workspace: &Workspace) -> Result<Done, Failure> {
 
 /// Prints the steps.
 pub(crate) fn list() {
-    for step in &ALL {
+    for step in ALL.iter().chain(&MORE) {
         println!("{:<10} {}", step.name, step.shows);
     }
 }
@@ -148,14 +164,15 @@ pub(crate) fn list() {
 /// The steps with these names, divided by commas, in their usual order.
 pub(crate) fn named(names: &str) -> Result<Vec<Step>, Failure> {
     let names: Vec<&str> = names.split(',').map(str::trim).collect();
-    if let Some(wrong) = names.iter().find(|name| !ALL.iter().any(|step| step.name == **name)) {
-        let right: Vec<&str> = ALL.iter().map(|step| step.name).collect();
+    let known = || ALL.iter().chain(&MORE);
+    if let Some(wrong) = names.iter().find(|name| !known().any(|step| step.name == **name)) {
+        let right: Vec<&str> = known().map(|step| step.name).collect();
         return Err(Failure::usage(
             format!("there is no step \"{wrong}\""),
             format!("There are: {}.", right.join(", ")),
         ));
     }
-    Ok(ALL.into_iter().filter(|step| names.contains(&step.name)).collect())
+    Ok(ALL.into_iter().chain(MORE).filter(|step| names.contains(&step.name)).collect())
 }
 
 /// Runs steps until one fails, then says how each ended.

@@ -17,12 +17,11 @@ use std::io;
 use std::os::unix::fs::OpenOptionsExt;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
-use std::sync::atomic::Ordering;
 
 use runtime::{FolderError, RunFolder};
 use types::Time;
 
-use page::{PAGE, Page};
+use page::{Ordering, PAGE, Page};
 
 /// What the first word of a page says: whose it is, and the form of what follows.
 const MARK: u64 = u64::from_le_bytes(*b"sinewla1");
@@ -267,6 +266,79 @@ fn map(path: &Path) -> io::Result<Page> {
         file.set_len(PAGE as u64)?;
     }
     Page::map(&file)
+}
+
+/// Setters and who resets at once, in every order.
+#[cfg(all(test, loom))]
+mod model {
+    use super::*;
+
+    /// Two set it, each after something that led to it, while a third resets it; says what the reset found, and the end.
+    fn play(check: impl Fn(LatchState, LatchState) + Sync + Send + 'static) {
+        // Three threads at will are two minutes; a mistake that takes more than two changes of who runs is one that nobody made yet.
+        let mut model = loom::model::Builder::new();
+        model.preemption_bound = Some(2);
+        model.check(move || {
+            let latch = Latch::private();
+            let setter = |cause: Cause, at: i64| {
+                let latch = latch.clone();
+                loom::thread::spawn(move || latch.set(cause, Time(at)))
+            };
+            let (bumper, person) = (setter(Cause::Bumper, 5), setter(Cause::Person, 7));
+            let before = latch.reset(Time(9));
+            bumper.join().unwrap();
+            person.join().unwrap();
+            let after = latch.state();
+            check(before, after);
+            if after.is_set() {
+                assert!([5, 7].contains(&latch.set_at().0), "set at {:?}", latch.set_at());
+            }
+        });
+    }
+
+    #[test]
+    fn each_set_is_either_reset_by_who_saw_it_or_stands() {
+        play(|before, after| {
+            for cause in [Cause::Bumper, Cause::Person] {
+                assert!(before.has(cause) != after.has(cause), "{cause:?}: {before:?}, {after:?}");
+            }
+            assert_eq!(
+                after.resets(),
+                u64::from(before.is_set()),
+                "each reset of a set latch is counted once"
+            );
+        });
+    }
+
+    #[test]
+    fn two_resets_clear_one_set_once() {
+        loom::model(|| {
+            let latch = Latch::private();
+            latch.set(Cause::Safety, Time(3));
+            let other = latch.clone();
+            let there = loom::thread::spawn(move || other.reset(Time(5)).is_set());
+            let here = latch.reset(Time(6)).is_set();
+            assert!(here != there.join().unwrap(), "one of them cleared it");
+            assert_eq!((latch.is_set(), latch.state().resets()), (false, 1));
+        });
+    }
+
+    #[test]
+    fn who_sees_it_set_sees_what_led_to_it() {
+        loom::model(|| {
+            let latch = Latch::private();
+            let led = std::sync::Arc::new(page::AtomicU64::new(0));
+            let (mine, reason) = (latch.clone(), led.clone());
+            let setter = loom::thread::spawn(move || {
+                reason.store(1, Ordering::Relaxed);
+                mine.set(Cause::Hardware, Time(4));
+            });
+            if latch.is_set() {
+                assert_eq!((led.load(Ordering::Relaxed), latch.set_at()), (1, Time(4)));
+            }
+            setter.join().unwrap();
+        });
+    }
 }
 
 #[cfg(test)]

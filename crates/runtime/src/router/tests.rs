@@ -1,5 +1,7 @@
 //! The registry and its executors, which serve changes when the test lets them.
 
+#![allow(clippy::unwrap_used)] // a test may
+
 use std::sync::Arc;
 
 use types::messages::Twist;
@@ -137,7 +139,7 @@ impl World {
 
     /// What the registry says.
     fn registry(&self) -> String {
-        let (agents, wires) = self.router.to_plan();
+        let (agents, _, wires) = self.router.to_plan();
         let known = |plan: &AgentPlan| {
             let known = self.router.known(&plan.name).unwrap();
             let params: Vec<_> = plan.params.rows().iter().map(|row| &row.entry.value).collect();
@@ -383,7 +385,7 @@ fn a_restart_waits_for_a_neighbour_that_takes_its_time() {
     for _ in 0..5 {
         world.with(0, |router, fabric, now| router.supervise(now, fabric));
         assert_eq!(world.router.known("b").unwrap().state, AgentState::Restarting);
-        world.now = world.now + Duration::secs(3);
+        world.now += Duration::secs(3);
     }
     world.settle();
     let known = world.router.known("b").unwrap();

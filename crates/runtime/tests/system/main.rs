@@ -5,22 +5,25 @@
 mod calls;
 mod cuts;
 mod deaths;
+mod filters;
 mod fire;
+mod gaps;
 mod memory;
 mod queues;
+mod requests;
 mod stuck;
 mod successor;
 mod thousand;
 mod wall;
 
 use runtime::{
-    Agent, Client, Direction, Envelope, Fault, FaultKind, Input, Options, Output, Params, Plan, QueuePlan,
-    Refusal, Registry, Reply, Request, Service, Simulation, Step, TimedRequest, WirePlan, registry,
+    Agent, Client, Direction, Fault, FaultKind, Input, Options, Output, Params, Plan, QueuePlan, Refusal,
+    Registry, Reply, Request, Service, Simulation, Step, TimedRequest, WirePlan, registry,
 };
 use std::sync::{Arc, Mutex};
 use types::messages::{Image, Twist};
 use types::value::{Span, Value};
-use types::{AgentId, Duration, Time};
+use types::{Duration, Time};
 
 /// Counts up.
 #[derive(Agent)]
@@ -135,7 +138,7 @@ fn options(millis: i64) -> Options {
 }
 
 fn types() -> Registry {
-    registry![Source, Relay, Sink, Asker, Answerer, Loop, Painter, Viewer, Postman]
+    registry![Source, Relay, Sink, Asker, Answerer, Loop, Painter, Viewer, filters::Postman]
 }
 
 /// source → relay → sink, the source every 10 ms.
@@ -205,260 +208,6 @@ fn an_agent_that_dies_again_and_again_is_left_dead() {
     let relay = report.view.agents.iter().find(|agent| agent.name == "relay").unwrap();
     assert_eq!(relay.counts.restarts, 5, "{:?}", report.incidents);
     assert_eq!(relay.state.name(), "dead");
-}
-
-#[test]
-fn a_filter_for_every_third_message_counts_each_message_once() {
-    for (test, wires) in [("every-alone", 1), ("every-beside", 2)] {
-        let mut plan = chain(test);
-        let to_relay = plan.wires.iter_mut().find(|wire| wire.to == "relay.from").unwrap();
-        to_relay.filter.every = 3;
-        if wires == 2 {
-            // A second route takes the other way through the output.
-            plan.add::<Sink>("beside", sink("nobody asks"));
-            plan.on("beside", "count");
-            plan.wires.push(WirePlan::new("source.out", "beside.count"));
-        }
-        Simulation::new(&plan, &types(), options(100)).unwrap().run().unwrap();
-        let numbers: Vec<i64> = heard(test).iter().map(|(_, twist)| twist.linear as i64).collect();
-        assert_eq!(numbers, [1, 4, 7, 10], "{test}");
-    }
-}
-
-#[test]
-fn a_least_gap_makes_an_agent_wait_for_messages_and_no_longer() {
-    let mut plan = Plan::new("gap");
-    let source = plan.add::<Source>("source", SourceParams::default());
-    let end = plan.add::<Sink>("sink", sink("gap"));
-    plan.wire(&source.out, &end.count);
-    plan.every("source", Duration::millis(10));
-    plan.on("sink", "count");
-    plan.agent_mut("sink").unwrap().min_gap = Duration::millis(25);
-    plan.requests = vec![
-        at(105, "fault source off"),
-        at(205, "fault source ok"),
-        at(245, "set sink min_gap 0ms"),
-        at(265, "fault source off"),
-    ];
-    let report = Simulation::new(&plan, &types(), options(400)).unwrap().run().unwrap();
-    let heard: Vec<(i64, i64)> =
-        heard("gap").iter().map(|(time, twist)| (time.0 / 1_000_000, twist.linear as i64)).collect();
-    let expected = [
-        // The first at once; then a step each 25 ms, which takes all that has come meanwhile, each message once.
-        [(0, 1)].as_slice(),
-        &[(25, 2), (25, 3)],
-        &[(50, 4), (50, 5), (50, 6)],
-        &[(75, 7), (75, 8)],
-        &[(100, 9), (100, 10), (100, 11)],
-        // After a pause longer than the gap nothing is waited for.
-        &[(210, 12)],
-        &[(235, 13), (235, 14)],
-        // Without a gap the next message makes it run at once, and the step that was put off is not made up for.
-        &[(245, 15)],
-        &[(250, 16)],
-        &[(260, 17)],
-    ];
-    assert_eq!(heard, expected.concat());
-    let steps = &report.view.agents[1];
-    assert_eq!(steps.counts.releases, expected.len() as u64, "no step without a message");
-    assert_eq!((steps.counts.missed, steps.jitter.max), (0, 0.0), "waiting for the gap is not being late");
-}
-
-#[test]
-fn a_least_gap_holds_for_messages_alone() {
-    let mut plan = Plan::new("gap-period");
-    let source = plan.add::<Source>("source", SourceParams::default());
-    let end = plan.add::<Sink>("sink", sink("gap-period"));
-    plan.wire(&source.out, &end.count);
-    plan.every("source", Duration::millis(10));
-    plan.on("sink", "count");
-    plan.every("sink", Duration::millis(50));
-    plan.agent_mut("sink").unwrap().min_gap = Duration::millis(30);
-    let report = Simulation::new(&plan, &types(), options(199)).unwrap().run().unwrap();
-    let mut steps: Vec<i64> = heard("gap-period").iter().map(|(time, _)| time.0 / 1_000_000).collect();
-    steps.dedup();
-    // By the clock at 0, 50, 100, 150; by messages 30 ms after the last step, whatever that was for.
-    assert_eq!(steps, [0, 30, 50, 80, 100, 130, 150, 180]);
-    assert_eq!(report.view.agents[1].counts.releases, steps.len() as u64);
-}
-
-/// Sends to the agents with the numbers 1 and 2 and to everybody, in turn.
-#[derive(Agent)]
-struct Postman {
-    /// The count, as a speed.
-    out: Output<Twist>,
-    n: u32,
-}
-
-impl Agent for Postman {
-    fn step(&mut self, _: &mut Step) -> Result<(), Fault> {
-        self.n += 1;
-        let recipient = [AgentId::NONE, AgentId(1), AgentId(2)][self.n as usize % 3];
-        let envelope = Envelope { recipient, ..Envelope::default() };
-        self.out.send_as(envelope, Twist::new(f64::from(self.n), 0.0));
-        Ok(())
-    }
-}
-
-#[test]
-fn a_filter_for_a_recipient_passes_what_is_for_it_or_for_everybody() {
-    let mut plan = Plan::new("recipients");
-    plan.add::<Postman>("postman", Default::default());
-    plan.every("postman", Duration::millis(10));
-    for (name, recipient) in [("one", Some("one")), ("two", Some("two")), ("all", None), ("spy", Some("one"))]
-    {
-        plan.add::<Sink>(name, sink(&format!("recipients-{name}")));
-        plan.on(name, "count");
-        let mut wire = WirePlan::new("postman.out", format!("{name}.count"));
-        wire.filter.recipient = recipient.map(str::to_owned);
-        plan.wires.push(wire);
-    }
-    plan.requests = vec![at(55, "remove one"), at(56, "unwire postman.out spy.count"), at(57, "remove one")];
-    let report = Simulation::new(&plan, &types(), options(80)).unwrap().run().unwrap();
-    let heard = |name: &str| -> Vec<f64> {
-        heard(&format!("recipients-{name}")).iter().map(|(_, twist)| twist.linear).collect()
-    };
-    assert_eq!(heard("one"), [1.0, 3.0, 4.0, 6.0]);
-    assert_eq!(heard("two"), [2.0, 3.0, 5.0, 6.0, 8.0, 9.0]);
-    assert_eq!(heard("all"), (1..10).map(f64::from).collect::<Vec<_>>());
-    assert_eq!(heard("spy"), heard("one"), "whoever is wired so hears what is for another");
-    let said: Vec<&str> = report.incidents.iter().map(|incident| incident.what.as_str()).collect();
-    let refused = "asked: remove one; refused: the wire from postman.out to spy.count takes what is for one";
-    assert_eq!(
-        said,
-        [
-            &format!("{refused}; cut that wire first"),
-            "asked: unwire postman.out spy.count",
-            "asked: remove one"
-        ]
-    );
-    assert_eq!(report.view.wires[0].filter.recipient.as_deref(), Some("two"), "people see the name");
-
-    plan.wires[0].filter.recipient = Some("oen".into());
-    let said = Simulation::new(&plan, &types(), options(80)).map(drop).unwrap_err().to_string();
-    assert_eq!(said, "the plan has 1 mistakes, the first: there is no agent \"oen\"; did you mean \"one\"?");
-}
-
-#[test]
-fn who_was_given_up_comes_back_under_its_number_and_its_wires_go_on_counting() {
-    let mut plan = Plan::new("recipient-back");
-    plan.add::<Postman>("postman", Default::default());
-    plan.every("postman", Duration::millis(10));
-    for name in ["one", "two", "spy"] {
-        let test = if name == "two" { "recipient-back-two".into() } else { format!("recipient-back-{name}") };
-        plan.add::<Sink>(name, sink(&test));
-        plan.on(name, "count");
-        plan.agent_mut(name).unwrap().executor = Some(["reflex", "control", "vision"][name.len() % 3].into());
-    }
-    plan.agent_mut("one").unwrap().executor = Some("ordinary".into());
-    for (to, recipient) in [("one", "one"), ("spy", "one"), ("two", "two")] {
-        let mut wire = WirePlan::new("postman.out", format!("{to}.count"));
-        wire.filter.recipient = Some(recipient.into());
-        plan.wires.push(wire);
-    }
-    plan.requests = vec![at(105, "fault one hang")];
-    let report = Simulation::new(&plan, &types(), options(3000)).unwrap().run().unwrap();
-    let one = &report.view.agents[1];
-    assert_eq!((one.id, one.counts.hangs, one.counts.restarts), (AgentId(1), 1, 1), "{:?}", report.incidents);
-    let heard = |name: &str| -> Vec<f64> {
-        heard(&format!("recipient-back-{name}")).iter().map(|(_, twist)| twist.linear).collect()
-    };
-    let all: Vec<f64> = (1..=301).filter(|n| n % 3 != 2).map(f64::from).collect();
-    assert_eq!(heard("spy"), all, "whoever hears what is for it");
-    let (first, last) = (heard("one")[0], heard("one").last().copied());
-    assert_eq!((first, last), (all[0], all.last().copied()), "it hears again");
-    let wire = &report.view.wires[0];
-    assert_eq!(wire.sent + wire.refused, all.len() as u64, "{wire:?}");
-    assert_eq!(wire.sent, wire.taken + wire.dropped, "what lay in its mailbox is counted: {wire:?}");
-    assert_eq!(wire.taken, heard("one").len() as u64);
-}
-
-#[test]
-fn an_output_misbehaves_as_it_is_asked_to() {
-    let mut plan = chain("faults");
-    let faults = ["stuck", "ok", "delayed", "ok", "off", "ok"];
-    plan.requests = faults
-        .iter()
-        .enumerate()
-        .map(|(i, kind)| at(95 + 100 * i as i64, &format!("fault source.out {kind}")))
-        .collect();
-    Simulation::new(&plan, &types(), options(700)).unwrap().run().unwrap();
-    let heard: Vec<(i64, i64)> =
-        heard("faults").iter().map(|(t, twist)| (t.0 / 1_000_000, twist.linear as i64)).collect();
-    let at = |from: i64, to: i64| {
-        heard.iter().filter(|(t, _)| (from..to).contains(t)).map(|(_, n)| *n).collect::<Vec<_>>()
-    };
-    assert_eq!(at(100, 195), [11; 10], "stuck at the first value of the fault");
-    assert_eq!(at(200, 295), (21..=30).collect::<Vec<_>>(), "well again");
-    assert_eq!(at(300, 395), (31..=37).collect::<Vec<_>>(), "three messages late");
-    assert_eq!(at(500, 595), [], "off");
-    assert_eq!(at(600, 695), (61..=70).collect::<Vec<_>>());
-}
-
-#[test]
-fn wiring_changes_while_the_rest_runs() {
-    let mut plan = chain("wiring");
-    plan.requests = vec![
-        at(205, "unwire source.out relay.from"),
-        at(405, "wire source.out relay.from"),
-        at(605, "remove relay"),
-    ];
-    let report = Simulation::new(&plan, &types(), options(1000)).unwrap().run().unwrap();
-    let numbers: Vec<i64> = heard("wiring").iter().map(|(_, twist)| twist.linear as i64).collect();
-    let expected: Vec<i64> = (1..=21).chain(42..=61).collect();
-    assert_eq!(numbers, expected);
-    assert_eq!(report.view.agents.len(), 2);
-    assert!(report.view.wires.is_empty());
-}
-
-#[test]
-fn a_parameter_and_a_period_change_between_steps() {
-    let mut plan = chain("set");
-    plan.requests = vec![at(95, "set source by 10"), at(195, "set source period 50ms")];
-    Simulation::new(&plan, &types(), options(400)).unwrap().run().unwrap();
-    let heard = heard("set");
-    let numbers: Vec<i64> = heard.iter().map(|(_, twist)| twist.linear as i64).collect();
-    assert_eq!(&numbers[..12], [1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 20, 30]);
-    let times: Vec<i64> = heard.iter().map(|(time, _)| time.0 / 1_000_000).filter(|t| *t >= 190).collect();
-    assert_eq!(times, [190, 240, 290, 340, 390]);
-}
-
-#[test]
-fn what_is_wrong_is_refused_with_the_reason_and_nothing_changes() {
-    let mut plan = chain("refused");
-    plan.requests = vec![
-        at(10, "wire source.out sink.cuont"),
-        at(20, "set source by -1"),
-        at(30, "wire sorce.out sink.count"),
-        at(40, "wire relay.from sink.count"),
-    ];
-    let report = Simulation::new(&plan, &types(), options(100)).unwrap().run().unwrap();
-    let said: Vec<&str> = report.incidents.iter().map(|incident| incident.what.as_str()).collect();
-    assert!(said[0].contains("there is no port of sink \"cuont\"; did you mean \"count\"?"), "{said:?}");
-    assert!(said[1].contains("\"by\" must be at least 0, not -1"), "{said:?}");
-    assert!(said[2].contains("did you mean \"source\"?"), "{said:?}");
-    assert!(said[3].contains("relay.from is an input"), "{said:?}");
-    assert_eq!(report.view.wires.len(), 2);
-}
-
-#[test]
-fn all_mistakes_of_a_plan_are_found_at_once() {
-    let mut plan = chain("mistakes");
-    plan.agent_mut("source").unwrap().kind = "sorce".into();
-    plan.agent_mut("relay").unwrap().on = vec!["frm".into()];
-    plan.agent_mut("sink").unwrap().executor = Some("reflx".into());
-    plan.wires.push(WirePlan::new("relay.to", "sink.counts"));
-    plan.agent_mut("sink").unwrap().params.set("tset", Value::from("x"));
-    let said: Vec<String> = runtime::check(&plan, &types()).iter().map(ToString::to_string).collect();
-    for part in [
-        "did you mean \"source\"?",
-        "did you mean \"from\"?",
-        "did you mean \"reflex\"?",
-        "did you mean \"count\"?",
-        "did you mean \"test\"?",
-    ] {
-        assert!(said.iter().any(|mistake| mistake.contains(part)), "{part} in {said:#?}");
-    }
 }
 
 /// Asks every 100 ms.

@@ -1,5 +1,7 @@
 //! A system of a thousand agents in which one comes, is wired and goes, again and again. What it costs is printed, never asserted.
 
+#![allow(clippy::disallowed_methods)] // what it costs is measured on the clock of the wall
+
 use std::time::Instant;
 
 use runtime::{AgentPlan, Control, Live, Options, Plan, Request, Simulation, WirePlan, registry};

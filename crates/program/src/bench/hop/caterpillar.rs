@@ -148,8 +148,9 @@ pub(super) fn measure(setting: &Setting<'_>, outcome: &mut Outcome) -> Result<()
     let (mut their_works, mut their_processes) = (Vec::new(), Vec::new());
     let args = ["--iterations".to_owned(), iterations.to_string(), "--cpu".to_owned(), CPU.to_string()];
     for _ in 0..setting.of(ROUNDS, if setting.shorter > 100 { 1 } else { 3 }) {
+        let before = recorded::idle(PERIOD)?;
         let ([thread, process], lost) = run(iterations, outcome)?;
-        let work = thread - recorded::idle(PERIOD)?;
+        let work = thread - (before + recorded::idle(PERIOD)?) / 2.0;
         lossy = lost.or(lossy);
         works.push(work);
         processes.push(process);

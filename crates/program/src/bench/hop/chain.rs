@@ -16,7 +16,8 @@ const WARM_UP: u64 = 100;
 pub(super) struct Trace {
     /// From the source's step to the sink's, of each message (ns).
     pub(super) spans: Shelf,
-    /// Processor time of the executor's thread, and of the process, from the first message that counts to the last (ns).
+    /// From the first message that counts to the last: processor time of the executor's thread and of the process, and the time that
+    /// went by (ns).
     pub(super) used: Shelf,
     over: Arc<AtomicBool>,
     /// Messages that count.
@@ -56,8 +57,8 @@ pub(super) struct Source {
     /// The parcel.
     pub(super) out: Output<Parcel>,
     number: u64,
-    /// What thread and process had used when the first message that counts was sent.
-    used: [u64; 2],
+    /// What thread and process had used, and what time it was, when the first message that counts was sent.
+    used: [u64; 3],
     trace: Trace,
 }
 
@@ -65,11 +66,12 @@ impl Agent for Source {
     fn step(&mut self, _: &mut Step) -> Result<(), Fault> {
         self.number += 1;
         if self.number == WARM_UP + 1 {
-            self.used = [thread_time(), process_time()];
+            self.used = [thread_time(), process_time(), now()];
         }
         if self.number > WARM_UP + self.trace.messages {
             if !self.trace.over.load(Ordering::Relaxed) {
-                let used = [thread_time() - self.used[0], process_time() - self.used[1]];
+                let [thread, process, begun] = self.used;
+                let used = [thread_time() - thread, process_time() - process, now() - begun];
                 self.trace.used.put(&used.map(|used| used as f64));
                 self.trace.over.store(true, Ordering::Release);
             }

@@ -6,15 +6,16 @@ use record::log::RunInfo;
 use runtime::{LogChoice, Options, Plan, Registry};
 use types::Duration;
 
-use crate::bench::outcome::Outcome;
+use crate::bench::outcome::{Outcome, median};
 use crate::bench::parcel::{self, live, now, pin, thread, thread_time};
 use crate::error::Failure;
 use crate::run::{Asked, Facts, LogFile};
 
 use super::CPU;
 
-/// Sleeps in a measurement of what sleeping costs.
-const SLEEPS: u64 = 5000;
+/// What sleeping costs is the middle of the means of so many blocks, each of so many sleeps: the machine disturbs some of them.
+const BLOCKS: u64 = 9;
+const SLEEPS: u64 = 500;
 
 /// What became of the messages of a run.
 #[derive(Clone, Copy, Debug, Default)]
@@ -25,8 +26,6 @@ pub(super) struct Kept {
     pub(super) found: u64,
     /// Lost before a receiver or before the log.
     pub(super) lost: u64,
-    /// Releases that were passed over.
-    pub(super) skipped: u64,
     /// The length of the file (bytes).
     pub(super) size: u64,
 }
@@ -89,7 +88,6 @@ pub(super) fn run(
         found: outputs.iter().filter_map(|(topic, _)| found(topic)).map(|topic| topic.messages).sum(),
         lost: report.log_dropped
             + report.view.wires.iter().map(|wire| wire.dropped + wire.refused).sum::<u64>(),
-        skipped: report.view.agents.iter().map(|agent| agent.counts.skipped).sum(),
         size: std::fs::metadata(&scratch.0).map_or(0, |data| data.len()),
     })
 }
@@ -99,11 +97,15 @@ pub(super) fn idle(period: Duration) -> Result<f64, Failure> {
     let sleeps = thread("bench-sleeps", move || {
         pin(CPU);
         let _ = rustix::thread::set_current_timer_slack(core::num::NonZeroU64::new(1));
-        let (begun, used, period) = (now(), thread_time(), period.0 as u64);
-        for round in 1..=SLEEPS {
-            sleep_until(begun + round * period);
-        }
-        (thread_time() - used) as f64 / SLEEPS as f64
+        let period = period.0 as u64;
+        let block = |_| {
+            let (begun, used) = (now(), thread_time());
+            for round in 1..=SLEEPS {
+                sleep_until(begun + round * period);
+            }
+            (thread_time() - used) as f64 / SLEEPS as f64
+        };
+        median((0..BLOCKS).map(block).collect())
     })?;
     parcel::end(sleeps)
 }
