@@ -24,7 +24,7 @@ use crate::log::{LogChoice, LogShared};
 use crate::names::Directory;
 use crate::plan::{AgentPlan, ExecutorPlan, WireFilter, WirePlan};
 use crate::port::{Direction, InputEnd, OutputEnd, PortEnds, WireCounts, WireId};
-use crate::queue_plan::QueuePlan;
+use crate::queue_plan::PlanParts;
 use crate::request::{AgentState, Refusal};
 use crate::ring::Overload;
 use crate::stats::AgentStats;
@@ -293,7 +293,7 @@ impl Router {
     }
 
     /// The running system as a plan that would start it.
-    pub(crate) fn to_plan(&self) -> (Vec<AgentPlan>, Vec<QueuePlan>, Vec<WirePlan>) {
+    pub(crate) fn to_plan(&self) -> PlanParts {
         let agents =
             self.agents.iter().map(|known| AgentPlan { params: known.params.clone(), ..known.plan.clone() });
         let wires = self.wires.iter().filter(|wire| !wire.is_answer).map(|wire| self.plan_of(wire));
