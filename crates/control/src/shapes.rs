@@ -14,8 +14,8 @@
 //! not granted, dropped or missed is in these numbers.
 
 use runtime::{
-    AgentPlan, AgentView, Direction, Figure, PortView, QueuePlan, QueueView, Refusal, Request, SystemView,
-    WireFilter, WirePlan, WireView,
+    AgentPlan, AgentView, Direction, Figure, PlanParts, PortView, QueuePlan, QueueView, Refusal, Request,
+    SystemView, WireFilter, WirePlan, WireView,
 };
 use serde_json::{Map, Value as Json, json};
 use types::Duration;
@@ -61,14 +61,11 @@ pub fn plan(name: &str, agents: &[AgentPlan], queues: &[QueuePlan], wires: &[Wir
     json!({"system": name, "requests": adds.chain(queues).chain(wires).collect::<Vec<_>>()})
 }
 
-/// The agents, queues and wires of a plan.
-pub type Parts = (Vec<AgentPlan>, Vec<QueuePlan>, Vec<WirePlan>);
-
 /// Reads what [`plan`] wrote.
 ///
 /// # Errors
 /// When it is something else.
-pub fn read_plan(json: &Json) -> Result<Parts, Refusal> {
+pub fn read_plan(json: &Json) -> Result<PlanParts, Refusal> {
     let wrong = || Refusal::new("this is no plan of a running system");
     let (mut agents, mut queues, mut wires) = (Vec::new(), Vec::new(), Vec::new());
     for request in json["requests"].as_array().ok_or_else(wrong)? {
@@ -203,7 +200,8 @@ mod tests {
         agent.params.set("side", types::value::Value::from("far left"));
         let wire = WirePlan { depth: Some(3), ..WirePlan::new("a.out", "c.in") };
         let queue = QueuePlan { depth: Some(5), ..QueuePlan::new("e") };
-        let json = plan("lab", &[agent.clone()], &[queue.clone()], &[wire.clone()]);
+        let one = std::slice::from_ref;
+        let json = plan("lab", one(&agent), std::slice::from_ref(&queue), std::slice::from_ref(&wire));
         assert_eq!(read_plan(&json), Ok((vec![agent], vec![queue], vec![wire])));
         assert!(read_plan(&json!({"requests": [["quit"]]})).is_err() && read_plan(&json!(3)).is_err());
     }

@@ -117,7 +117,7 @@ pub use port::{
     Direction, Envelope, Input, Output, OutputFault, Port, PortEnds, PortOptions, PortShape, PortVisit,
     Received, Sent, WireCounts, WireId,
 };
-pub use queue_plan::{MOST_SERVING, Queue, QueuePlan};
+pub use queue_plan::{MOST_SERVING, PlanParts, Queue, QueuePlan};
 pub use request::{
     AgentState, AgentView, Counts, ExecutorView, FaultKind, PortView, QueueView, ReceiverView, Refusal,
     Request, SystemView, WireTotals, WireView,

@@ -10,7 +10,7 @@ use types::value::Span;
 
 use crate::agent::{InputEnd as To, OutputEnd as From};
 use crate::message_type::MessageType;
-use crate::plan::{Plan, Wirable, WireFilter, WirePlan};
+use crate::plan::{AgentPlan, Plan, Wirable, WireFilter, WirePlan};
 use crate::port::{Direction, PortShape};
 use crate::queue::{MOST_IN_QUEUE, RINGS, SEATS};
 use crate::request::Refusal;
@@ -18,6 +18,9 @@ use crate::ring::Overload;
 
 /// The highest priority with which an input can be served: that of the highest executor.
 pub const MOST_SERVING: u8 = 99;
+
+/// The agents, queues and wires of a running system, as a plan would give them.
+pub type PlanParts = (Vec<AgentPlan>, Vec<QueuePlan>, Vec<WirePlan>);
 
 /// A queue in a plan. The type of its messages is that of the ports that are wired to it.
 #[derive(Clone, Debug, Default, PartialEq)]

@@ -33,7 +33,7 @@ use crate::log::{LogChoice, LogShared};
 use crate::names::Directory;
 use crate::plan::{AgentPlan, ExecutorPlan, WireFilter, WirePlan};
 use crate::port::{Direction, InputEnd, OutputEnd, OutputFault, PortEnds, WireCounts, WireId};
-use crate::queue_plan::QueuePlan;
+use crate::queue_plan::PlanParts;
 use crate::request::{AgentState, Refusal, WireTotals};
 use crate::ring::Overload;
 use crate::stats::AgentStats;
@@ -360,7 +360,7 @@ impl Router {
     }
 
     /// The running system as a plan that would start it.
-    pub(crate) fn to_plan(&self) -> (Vec<AgentPlan>, Vec<QueuePlan>, Vec<WirePlan>) {
+    pub(crate) fn to_plan(&self) -> PlanParts {
         let agents = self.in_order().into_iter();
         let agents = agents.map(|known| AgentPlan { params: known.params.clone(), ..known.plan.clone() });
         let wires = self.wires.values().filter(|wire| !wire.is_answer).map(|wire| self.plan_of(wire));

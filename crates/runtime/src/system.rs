@@ -11,8 +11,8 @@ use crate::check::{executors_of, wires_of};
 use crate::executor::Core;
 use crate::log::{LogChoice, Recorder};
 use crate::names::Directory;
-use crate::plan::{AgentPlan, Plan, WirePlan};
-use crate::queue_plan::QueuePlan;
+use crate::plan::Plan;
+use crate::queue_plan::PlanParts;
 use crate::request::{Refusal, Request, SystemView};
 use crate::router::{ExecutorKnown, Fabric, Incident, OutsideCall, Router, ServiceShape, Staged};
 use crate::tap::Tap;
@@ -21,7 +21,7 @@ use crate::tap::Tap;
 pub(crate) enum Ask {
     Request(Box<Request>, SyncSender<Result<(), Refusal>>),
     View(SyncSender<SystemView>),
-    Plan(SyncSender<(Vec<AgentPlan>, Vec<QueuePlan>, Vec<WirePlan>)>),
+    Plan(SyncSender<PlanParts>),
     Service(String, SyncSender<Result<ServiceShape, Refusal>>),
     Call(OutsideCall),
     Tap(String, SyncSender<Result<Tap, Refusal>>),
@@ -56,7 +56,7 @@ impl Control {
     }
 
     /// The agents, queues and wires that run, as a plan would give them.
-    pub fn plan(&self) -> Result<(Vec<AgentPlan>, Vec<QueuePlan>, Vec<WirePlan>), Refusal> {
+    pub fn plan(&self) -> Result<PlanParts, Refusal> {
         self.ask(Ask::Plan)
     }
 

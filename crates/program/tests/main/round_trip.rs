@@ -117,7 +117,7 @@ fn a_queue_is_read_with_the_wires_to_it_and_from_it() {
         ("right.ranges", "left.ranges", "there are two wires from seen to left.ranges"),
         ("[\"seen\"]", "[{ to = \"seen\", depth = 3 }]", "depth and overload are those of queue \"seen\""),
         ("\"left.ranges\"", "{ to = \"left.ranges\", every = 2 }", "has a filter"),
-        ("eyes.filtered", "left.safety", "queue \"seen\" holds SafetyState, left.ranges has"),
+        ("eyes.filtered", "left.safety", "queue \"seen\" holds Safety, left.ranges has Ranges"),
     ] {
         let text = text.replacen(right, wrong, 1);
         let mistakes = read_plan(&text, "shared.toml", &registry()).unwrap_err().to_string();

@@ -60,15 +60,15 @@ impl Key {
     }
 }
 
-struct Entry {
-    state: AtomicU64,
-    /// The key of the message, beside it: a slot is read only by its owner, and whoever compares fronts owns none of them.
+/// The key of the message in a slot, beside it: a slot is read only by its owner, and whoever compares fronts owns none of them.
+#[derive(Default)]
+struct Label {
     stamp: AtomicU64,
     who: AtomicU64,
 }
 
-impl Entry {
-    fn set_key(&self, key: Key) {
+impl Label {
+    fn set(&self, key: Key) {
         self.stamp.store(key.stamp as u64, Ordering::Relaxed);
         self.who.store(u64::from(key.below) << 32 | u64::from(key.sender), Ordering::Relaxed);
     }
@@ -114,7 +114,8 @@ pub(super) struct Front {
 }
 
 pub(super) struct Ring<P> {
-    entries: Box<[Entry]>,
+    entries: Box<[AtomicU64]>,
+    labels: Box<[Label]>,
     slots: Box<[UnsafeCell<P>]>,
     closed: AtomicU32,
 }
@@ -128,14 +129,11 @@ unsafe impl<P: Send> Send for Ring<P> {}
 impl<P: Default> Ring<P> {
     /// A ring for `depth` messages: the entries name the first slots, the sender owns the next one, and each receiver one more.
     pub(super) fn new(depth: usize, receivers: usize) -> Ring<P> {
-        let entry = |i: usize| Entry {
-            state: AtomicU64::new(empty(i as u16, i as u64)),
-            stamp: AtomicU64::new(0),
-            who: AtomicU64::new(0),
-        };
+        let slots = depth + 1 + receivers;
         Ring {
-            entries: (0..depth).map(entry).collect(),
-            slots: (0..depth + 1 + receivers).map(|_| UnsafeCell::new(P::default())).collect(),
+            entries: (0..depth).map(|i| AtomicU64::new(empty(i as u16, i as u64))).collect(),
+            labels: (0..slots).map(|_| Label::default()).collect(),
+            slots: (0..slots).map(|_| UnsafeCell::new(P::default())).collect(),
             closed: AtomicU32::new(0),
         }
     }
@@ -150,18 +148,18 @@ impl<P> Ring<P> {
         self.closed.store(0, Ordering::Relaxed);
     }
 
-    fn entry(&self, position: u64) -> &Entry {
+    fn entry(&self, position: u64) -> &AtomicU64 {
         &self.entries[(position % self.entries.len() as u64) as usize]
     }
 
     /// How many messages wait, for people.
     pub(super) fn waiting(&self) -> usize {
-        self.entries.iter().filter(|entry| entry.state.load(Ordering::Relaxed) & FULL != 0).count()
+        self.entries.iter().filter(|entry| entry.load(Ordering::Relaxed) & FULL != 0).count()
     }
 
     /// Whether the sender has room for a message without displacing another.
     pub(super) fn has_room(&self, filling: &Filling) -> bool {
-        self.entry(filling.position).state.load(Ordering::Relaxed) & FULL == 0
+        self.entry(filling.position).load(Ordering::Relaxed) & FULL == 0
     }
 
     /// Fills the next message in place and sends it. Where there is no room it displaces the oldest if it may, else answers
@@ -181,24 +179,23 @@ impl<P> Ring<P> {
         let put = || {
             // SAFETY: `filling.slot` is the sender's own.
             self.slots[usize::from(filling.slot)].with_mut(|place| fill(unsafe { &mut *place }));
-            // Where an older message is there still its key may be taken for this one: then the exchange of who reads it fails.
-            entry.set_key(key);
+            self.labels[usize::from(filling.slot)].set(key);
         };
         let next = full(filling.slot, filling.position);
         let old = if displaces {
             put();
             // Release pairs with the acquire in `front`, for what was filled; acquire pairs with the release in `take`, for the
             // slot that comes back.
-            entry.state.swap(next, named("queue: displace", Ordering::AcqRel))
+            entry.swap(next, named("queue: displace", Ordering::AcqRel))
         } else {
             // Pairs with the release in `take`.
-            let old = entry.state.load(named("queue: refuse, look", Ordering::Acquire));
+            let old = entry.load(named("queue: refuse, look", Ordering::Acquire));
             if old & FULL != 0 {
                 return Pushed::Full;
             }
             put();
             // Pairs with the acquire in `front`. An empty entry is the sender's to change.
-            entry.state.store(next, named("queue: refuse, put", Ordering::Release));
+            entry.store(next, named("queue: refuse, put", Ordering::Release));
             old
         };
         filling.slot = slot_of(old);
@@ -214,7 +211,7 @@ impl<P> Ring<P> {
             let position = taking.position.get();
             let entry = self.entry(position);
             // Pairs with the release in `push`: key and message are those of this state.
-            let state = entry.state.load(named("queue: look", Ordering::Acquire));
+            let state = entry.load(named("queue: look", Ordering::Acquire));
             let at = position_of(state);
             if at > position {
                 // The one a whole ring before it is gone, and so is everything before that.
@@ -224,7 +221,7 @@ impl<P> Ring<P> {
             if at < position || state & FULL == 0 {
                 return None;
             }
-            return Some(Front { state, key: entry.key() });
+            return Some(Front { state, key: self.labels[usize::from(slot_of(state))].key() });
         }
     }
 
@@ -236,7 +233,7 @@ impl<P> Ring<P> {
         // Release pairs with the acquire in `push`: this end has done reading the slot that it gives back, and the key.
         let ordering = named("queue: give back", Ordering::Release);
         let entry = self.entry(position);
-        if entry.state.compare_exchange(front.state, next, ordering, Ordering::Relaxed).is_err() {
+        if entry.compare_exchange(front.state, next, ordering, Ordering::Relaxed).is_err() {
             return false;
         }
         taking.slot.set(slot_of(front.state));
