@@ -2,9 +2,11 @@
 
 #![allow(unsafe_code)]
 
+#[cfg(target_arch = "x86_64")]
+use core::sync::atomic::AtomicU8;
 #[cfg(not(loom))]
 use core::sync::atomic::AtomicU32;
-use core::sync::atomic::{AtomicI32, AtomicU8, Ordering};
+use core::sync::atomic::{AtomicI32, Ordering};
 use std::io;
 
 /// Waits while `word` is `expected`, until it is woken or `until` (monotonic clock, nanoseconds) has come.
@@ -184,25 +186,28 @@ pub(crate) fn barrier_everywhere() {
 #[inline(always)]
 pub(crate) fn ticks() -> u64 {
     #[cfg(target_arch = "x86_64")]
-    {
-        static STEADY: AtomicU8 = AtomicU8::new(UNKNOWN);
-        const UNKNOWN: u8 = 0;
-        const NO: u8 = 1;
-        const YES: u8 = 2;
-        #[cold]
-        fn find_out() -> u8 {
-            let found = if is_steady() { YES } else { NO };
-            STEADY.store(found, Ordering::Relaxed);
-            found
-        }
-        let mut steady = STEADY.load(Ordering::Relaxed);
-        if steady == UNKNOWN {
-            steady = find_out();
-        }
-        if steady == YES {
-            // SAFETY: every x86-64 processor has the instruction.
-            return unsafe { core::arch::x86_64::_rdtsc() };
-        }
+    if STEADY.load(Ordering::Relaxed) == YES {
+        // SAFETY: every x86-64 processor has the instruction.
+        return unsafe { core::arch::x86_64::_rdtsc() };
+    }
+    other_ticks()
+}
+
+/// Whether the time stamp counter is used: not known before it is asked for the first time.
+#[cfg(target_arch = "x86_64")]
+static STEADY: AtomicU8 = AtomicU8::new(0);
+#[cfg(target_arch = "x86_64")]
+const NO: u8 = 1;
+#[cfg(target_arch = "x86_64")]
+const YES: u8 = 2;
+
+#[cold]
+#[inline(never)]
+fn other_ticks() -> u64 {
+    #[cfg(target_arch = "x86_64")]
+    if STEADY.load(Ordering::Relaxed) != NO {
+        STEADY.store(if is_steady() { YES } else { NO }, Ordering::Relaxed);
+        return ticks();
     }
     monotonic() as u64
 }

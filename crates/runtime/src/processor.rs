@@ -248,7 +248,7 @@ impl<'a> Stopwatch<'a> {
     }
 
     /// The beginning or the end of a step. Whom nobody can pre-empt reads the time alone.
-    #[inline]
+    #[inline(always)]
     fn read(&self) -> Reading {
         match self.only {
             Some((only, line)) => Reading::on(only, line),

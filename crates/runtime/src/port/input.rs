@@ -21,7 +21,7 @@ use crate::{queue, ring};
 pub(super) enum Source<T: Message> {
     Value(ring::Receiver<Parcel<T>>),
     Link(ring::Receiver<Parcel<Link>>, Seat<T>),
-    Queue(queue::Receiver<Parcel<T>>),
+    Queue(Box<queue::Receiver<Parcel<T>>>),
 }
 
 impl<T: Message> Source<T> {

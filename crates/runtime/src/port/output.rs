@@ -36,7 +36,7 @@ pub(super) struct Route<T: Message> {
     pub(super) target: Target,
     pub(super) counts: Arc<WireCounts>,
     /// In the place of the rings where it leads to a queue. It goes last: while somebody counts here its places are not given to others.
-    pub(super) queue: Option<queue::Sender<Parcel<T>>>,
+    pub(super) queue: Option<Box<queue::Sender<Parcel<T>>>>,
 }
 
 pub(super) struct NewRoute<T: Message> {
@@ -329,7 +329,7 @@ impl<T: Message> Output<T> {
             core.inner().routes.iter().all(|route| {
                 route.values.iter().all(|(_, ring)| ring.has_room())
                     && route.links.iter().all(|(_, ring)| ring.has_room())
-                    && route.queue.as_ref().is_none_or(queue::Sender::has_room)
+                    && route.queue.as_deref().is_none_or(queue::Sender::has_room)
             })
         })
     }

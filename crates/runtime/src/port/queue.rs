@@ -105,7 +105,7 @@ impl<T: Message> QueueEnd for QueueCore<T> {
             overload: self.form.overload,
             values: Vec::new(),
             links: Vec::new(),
-            queue: Some(sender),
+            queue: Some(Box::new(sender)),
             target,
             counts: wire.counts.clone(),
         };
@@ -121,7 +121,7 @@ impl<T: Message> QueueEnd for QueueCore<T> {
     ) -> Option<(AnyBox, u32)> {
         let receiver = self.shared.receiver(executor, slot)?;
         let seat = receiver.number();
-        let source = Source::Queue(receiver);
+        let source = Source::Queue(Box::new(receiver));
         let lane = Lane::<T> { wire: wire.id, source, counts: wire.counts.clone(), staged: false };
         Some((Box::new(NewLanes { lanes: vec![lane], room: Vec::with_capacity(lanes + 1) }), seat))
     }
@@ -206,7 +206,7 @@ impl Teller<'_> {
 impl<T: Message> InputInner<T> {
     fn queues(&self) -> impl Iterator<Item = &crate::queue::Receiver<Parcel<T>>> {
         self.lanes.iter().filter_map(|lane| match &lane.source {
-            Source::Queue(queue) => Some(queue),
+            Source::Queue(queue) => Some(&**queue),
             _ => None,
         })
     }
