@@ -2,6 +2,8 @@
 
 #![allow(clippy::unwrap_used)] // a test may
 
+mod queues;
+
 use std::sync::Arc;
 
 use types::messages::Twist;
