@@ -60,7 +60,7 @@ const BENCHES: &[Bench] = &[
     Bench {
         name: "hop",
         what: "messages between agents of one executor, with and without a log, to one and to 64, small and large",
-        goal: "hop/copper 1, hop_logged/copper_logged 1, fanout64/rtrb 3, fanout64_ports/rtrb 1.3, picture/hop64 1.15, caterpillar/copper 0.5",
+        goal: "hop/copper 0.5, hop_logged/copper_logged 0.25, fanout64/rtrb 3, fanout64_ports/rtrb 1.3, picture/hop64 1.15, caterpillar/copper 0.5",
         measure: hop::measure,
     },
     Bench {
