@@ -124,7 +124,7 @@ impl Core {
         let (core, seat) = unsafe { (&mut *core, &mut *seat) };
         let alarm = context.end();
         core.mark_woken(context);
-        core.account(seat, job, begun, *at, checked, watch);
+        core.account(context, seat, job, begun, *at, checked, watch);
         let used = after - before - in_start;
         if !matches!(result, Ok(true)) {
             core.died(context, job.slot, at.time, result, body, used);
@@ -165,8 +165,10 @@ impl Core {
 
     /// Counts a step.
     #[inline]
+    #[allow(clippy::too_many_arguments)]
     fn account(
         &mut self,
+        context: &Context,
         seat: &Seat,
         job: Job,
         begun: Moment,
@@ -185,7 +187,9 @@ impl Core {
             self.account_disturbed(seat, job, begun, ended, own, stalls, checked, watch);
         }
         if ended.time > job.deadline {
-            missed(seat, job.release, ended.time, watch);
+            // In simulated time a step takes none.
+            let own = watch.map_or(0, |_| took.saturating_sub(scaled(others, self.rate)));
+            missed(context, seat, job, begun, ended, own, watch);
         }
     }
 
@@ -289,10 +293,40 @@ fn unusual(
     body.step(step)
 }
 
+/// Counts a step that ended behind its deadline, and notes in the log what was to blame: the greatest part of what it took from its release
+/// on. `own` is what it used of its processor (ns).
 #[cold]
-fn missed(seat: &Seat, release: Time, end: Time, watch: Option<&Stopwatch<'_>>) {
+fn missed(
+    context: &Context,
+    seat: &Seat,
+    job: Job,
+    begun: Moment,
+    ended: Moment,
+    own: u64,
+    watch: Option<&Stopwatch<'_>>,
+) {
     bump(&seat.stats.missed);
-    if watch.is_some_and(|watch| watch.witness.saw_stall(release, end)) {
+    let millis = |nanos: u64| nanos as f64 * 1e-6;
+    let behind = millis(nanos(ended.time - job.deadline));
+    let late = nanos(begun.time - job.release);
+    let others = nanos(ended.time - begun.time).saturating_sub(own);
+    let note = |text, numbers: &[f64]| {
+        context.log(|log| log.note(ended.time, seat.id, text, numbers));
+    };
+    if watch.is_some_and(|watch| watch.witness.saw_stall(job.release, ended.time)) {
         bump(&seat.stats.stalled);
+        note("missed its deadline by {} ms: a processor stood still", &[behind]);
+    } else if late >= own.max(others) {
+        note(
+            "missed its deadline by {} ms: its step began {} ms late, behind others",
+            &[behind, millis(late)],
+        );
+    } else if others > own {
+        note(
+            "missed its deadline by {} ms: higher executors took {} ms of its step",
+            &[behind, millis(others)],
+        );
+    } else {
+        note("missed its deadline by {} ms: its step took {} ms", &[behind, millis(own)]);
     }
 }

@@ -406,6 +406,29 @@ fn two_runs_write_the_same_bytes() {
     assert!(a == b, "the bytes differ");
 }
 
+/// The relay hangs, and the source behind it on the same executor is late: its log says by how much, and why.
+#[test]
+fn a_missed_deadline_names_its_cause() {
+    let mut plan = chain("late");
+    plan.requests = vec![at(200, "fault relay hang")];
+    ["relay", "source"]
+        .into_iter()
+        .for_each(|name| plan.agent_mut(name).unwrap().executor = Some("reflex".into()));
+    // It hangs at 210 ms for 400 ms: the last release of the source meanwhile is that at 600 ms.
+    plan.every("source", Duration::millis(30));
+    plan.agent_mut("source").unwrap().deadline = Some(Duration::millis(4));
+    let bytes = Arc::<Mutex<Vec<u8>>>::default();
+    let options = Options { recorder: Some(Box::new(Written(bytes.clone()))), ..options(2000) };
+    let report = Simulation::new(&plan, &types(), options).unwrap().run().unwrap();
+    let source = report.view.agents.iter().find(|agent| agent.name == "source").unwrap();
+    assert_eq!(source.counts.missed, 1, "{:?}", report.incidents);
+    let log = String::from_utf8_lossy(&bytes.lock().unwrap()).into_owned();
+    let said: Vec<&str> = log.matches("sourcemissed").collect();
+    assert_eq!(said.len(), 1, "{log}");
+    let text = "sourcemissed its deadline by 6 ms: its step began 10 ms late, behind others";
+    assert!(log.contains(text), "{log}");
+}
+
 #[test]
 fn ports_are_known_by_their_shape() {
     let types = types();
