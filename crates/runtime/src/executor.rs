@@ -44,6 +44,8 @@ pub(crate) struct Seat {
     pub id: AgentId,
     pub name: Name,
     pub body: Option<Box<dyn Body>>,
+    /// The agent when all were stopped: it is not run any more.
+    pub at_rest: Option<Box<dyn Body>>,
     /// The inputs whose messages make it run.
     pub on: Vec<Arc<dyn InputEnd>>,
     /// Whether any of them takes messages out of a queue.
@@ -51,6 +53,8 @@ pub(crate) struct Seat {
     pub timing: Timing,
     pub stats: Arc<AgentStats>,
     pub next_release: Time,
+    /// Whether its time has come and its step has not begun: it is among those that are due, once.
+    pub is_due: bool,
     /// The step that the agent asked for.
     pub alarm: Time,
     /// The step that a message asked for too soon after the last one: when it may be. The next step is that one, whatever for.
@@ -259,6 +263,9 @@ impl Core {
     fn next_due(&mut self, now: Time) -> Option<Job> {
         self.collect_due(now);
         let Reverse((deadline, rank, slot, release)) = self.due.pop()?;
+        if let Some(seat) = self.seats.get_mut(slot as usize).and_then(Option::as_deref_mut) {
+            seat.is_due = false;
+        }
         self.ready.clear(rank);
         Some(Job { slot, release, deadline, by_clock: true })
     }
@@ -316,7 +323,7 @@ impl Core {
             }
             if let Some(release) = release
                 && let Some(rank) = self.ready.rank_of(slot)
-                && !self.due.iter().any(|Reverse((_, _, known, _))| *known == slot)
+                && !core::mem::replace(&mut seat.is_due, true)
             {
                 let deadline = release.saturating_add(seat.timing.deadline);
                 self.due.push(Reverse((deadline, rank, slot, release)));

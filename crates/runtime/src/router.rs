@@ -162,6 +162,8 @@ pub(crate) struct ExecutorKnown {
     slots: Vec<Option<AgentId>>,
     /// The number of the last change to which it has answered.
     answered: u64,
+    /// What that was when it was last told that there is room for more answers.
+    rung_at: u64,
 }
 
 /// Something that the supervisor did or saw, to be told to people.
@@ -376,7 +378,7 @@ impl ExecutorKnown {
     }
 
     pub(crate) fn new(plan: ExecutorPlan, link: Link) -> ExecutorKnown {
-        ExecutorKnown { plan, link, granted: "simulated".into(), slots: Vec::new(), answered: 0 }
+        ExecutorKnown { plan, link, granted: "simulated".into(), slots: Vec::new(), answered: 0, rung_at: 0 }
     }
 }
 

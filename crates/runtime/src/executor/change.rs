@@ -181,6 +181,11 @@ impl Link {
         number
     }
 
+    /// The number of the change that was given last.
+    pub(crate) fn last_given(&self) -> u64 {
+        self.given
+    }
+
     /// The next answer.
     pub(crate) fn answer(&mut self) -> Option<Answer> {
         if self.answers.advance() { self.answers.current_mut().take() } else { None }
@@ -409,6 +414,11 @@ unsafe fn commit(
             for slot in 0..unsafe { &*core }.seats.len() as u32 {
                 // SAFETY: as above.
                 unsafe { visit.stop(slot, &mut foreign) }?;
+                // SAFETY: as above.
+                if let Some(seat) = unsafe { &mut *core }.seats[slot as usize].as_deref_mut() {
+                    // Nobody has a step after his stop, though messages may still come.
+                    seat.at_rest = seat.body.take();
+                }
             }
         }
         plain => {

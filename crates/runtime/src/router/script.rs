@@ -123,9 +123,20 @@ impl Router {
 
     /// Takes answers and gives what can be given, until nothing moves any more.
     pub(super) fn advance(&mut self, fabric: &mut dyn Fabric) {
-        self.take_answers();
-        while self.give(fabric) {
+        loop {
             self.take_answers();
+            let mut moved = self.give(fabric);
+            for (at, executor) in self.executors.iter_mut().enumerate() {
+                // One whose answers found no room any more has ceased to serve. Now there is room, and nobody else tells it.
+                let owes = executor.answered < executor.link.last_given();
+                if owes && core::mem::replace(&mut executor.rung_at, executor.answered) != executor.answered {
+                    fabric.ring(at);
+                    moved = true;
+                }
+            }
+            if !moved {
+                return;
+            }
         }
     }
 

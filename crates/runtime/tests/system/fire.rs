@@ -196,7 +196,8 @@ fn under_fire() {
         "nothing is left of what was refused or removed"
     );
     let wire = &report.view.wires[0];
-    assert_eq!((wire.dropped, wire.refused, wire.sent), (0, 0, wire.taken), "{wire:?}");
+    // What was sent when the receiver had stopped is still on the wire; that none before is missing, the numbers show.
+    assert!((wire.dropped, wire.refused) == (0, 0) && wire.sent >= wire.taken, "{wire:?}");
     assert!(wire.taken > 100, "{wire:?}");
     assert_eq!((OUT_OF_ORDER.load(Ordering::Relaxed), LAST.load(Ordering::Relaxed)), (0, wire.taken));
     assert_eq!(after.1, before.1, "threads");

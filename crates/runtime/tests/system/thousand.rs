@@ -83,3 +83,20 @@ fn one_of_a_thousand_comes_and_goes() {
         assert_eq!((agents, wires), (AGENTS, AGENTS - 1));
     }
 }
+
+/// More changes than an executor can have under way, when all stand on one.
+#[test]
+fn a_system_of_many_wires_is_made_whole() {
+    let mut plan = plan();
+    plan.agents.iter_mut().for_each(|agent| agent.executor = Some("reflex".into()));
+    for i in 0..AGENTS - 2 {
+        // Across the rows, and filtered so that nothing goes there.
+        let mut wire = WirePlan::new(format!("relay{}.to", i + 1), format!("relay{i}.from"));
+        wire.filter.marker = Some(7);
+        plan.wires.push(wire);
+    }
+    let report = Simulation::new(&plan, &registry![Source, Relay], options(500)).unwrap().run().unwrap();
+    let silent: Vec<_> = report.view.agents.iter().filter(|agent| agent.counts.releases == 0).collect();
+    assert!(silent.is_empty(), "{} agents have no step", silent.len());
+    assert_eq!(report.view.wires.len(), plan.wires.len());
+}
