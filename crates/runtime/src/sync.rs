@@ -190,6 +190,8 @@ pub(crate) mod weaken {
     static WEAK: Mutex<(Option<&'static str>, BTreeSet<&'static str>)> = Mutex::new((None, BTreeSet::new()));
     /// One model at a time: the name above is for the whole process.
     static ONE: Mutex<()> = Mutex::new(());
+    /// Nearly all mistakes show with two interruptions.
+    const MOST: usize = 3;
 
     fn is_weak(name: &'static str) -> bool {
         let mut weak = WEAK.lock().unwrap_or_else(PoisonError::into_inner);
@@ -207,12 +209,18 @@ pub(crate) mod weaken {
         }
     }
 
-    /// A search in which a thread is interrupted three times at most where it could go on: nearly all mistakes show with two.
-    /// LOOM_MAX_PREEMPTIONS says another number.
-    fn bounded() -> loom::model::Builder {
+    /// A search in which a thread is interrupted so many times at most where it could go on. LOOM_MAX_PREEMPTIONS says another number.
+    fn bounded(preemptions: usize) -> loom::model::Builder {
         let mut builder = loom::model::Builder::new();
-        builder.preemption_bound = builder.preemption_bound.or(Some(3));
+        builder.preemption_bound = builder.preemption_bound.or(Some(preemptions));
         builder
+    }
+
+    /// Runs a model as it ships and no more, where there are too many orders for all of it.
+    pub(crate) fn run(preemptions: usize, model: impl Fn() + Sync + Send + 'static) {
+        // What it meets is not for the models that weaken.
+        let _one = ONE.lock().unwrap_or_else(PoisonError::into_inner);
+        bounded(preemptions).check(model);
     }
 
     /// Runs a model as it ships, then once for each ordering that it met, weakened; says for each what the model found.
@@ -226,7 +234,7 @@ pub(crate) mod weaken {
                 super::explored::turn();
                 model();
             };
-            let found = std::panic::catch_unwind(std::panic::AssertUnwindSafe(|| bounded().check(model)));
+            let found = std::panic::catch_unwind(std::panic::AssertUnwindSafe(|| bounded(MOST).check(model)));
             WEAK.lock().unwrap_or_else(PoisonError::into_inner).0 = None;
             found.map_err(|what| {
                 let text = what.downcast_ref::<String>().cloned();
