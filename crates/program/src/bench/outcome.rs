@@ -83,6 +83,13 @@ impl Outcome {
 
     /// Adds ours and theirs from rounds in which they took turns: the round whose ratio is in the middle.
     pub(super) fn compare(&mut self, name: &'static str, mut rounds: Vec<(f64, f64)>) {
+        // A difference of two measurements can be lost in their noise: then it says nothing of either side.
+        let is_lost = |round: &(f64, f64)| round.0 <= 0.0 || round.1 <= 0.0;
+        if rounds.iter().any(is_lost) {
+            let what = "what was measured is smaller than the noise of the measurement";
+            self.without(name, Some(Failure::new(what).help("try again when the machine is quiet")));
+            return;
+        }
         rounds.sort_by(|a, b| (a.0 / a.1).total_cmp(&(b.0 / b.1)));
         if let Some(&(ours, theirs)) = rounds.get(rounds.len() / 2) {
             self.ratios.push(Ratio { name, ours, theirs, value: ours / theirs });
@@ -208,5 +215,13 @@ mod tests {
         let theirs = Measured::new("theirs", "ns", [vec![1.0; 98], vec![20.0; 2]].concat());
         outcome.compare_tails("c/d", &ours, &theirs);
         assert_eq!((outcome.ratios[1].ours, outcome.ratios[1].value), (2.0, 2.0));
+    }
+
+    #[test]
+    fn what_is_lost_in_noise_gives_no_ratio() {
+        let mut outcome = Outcome::default();
+        outcome.compare("a/b", vec![(3.0, 2.0), (-1.0, 2.0), (4.0, 2.0)]);
+        assert!(outcome.ratios.is_empty());
+        assert_eq!(outcome.failed[0].0, "a/b");
     }
 }
