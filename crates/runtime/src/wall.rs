@@ -323,6 +323,8 @@ impl Runner {
         };
         let now = self.clock.now();
         self.end();
+        // A short run may be over before anybody has looked at what its threads were granted.
+        self.note_grants();
         let view = self.router.view(now);
         let log_dropped = self.log.finish();
         Ok(Report {
