@@ -2,13 +2,13 @@
 
 #![allow(unsafe_code)]
 
+use core::sync::atomic::{AtomicU64, Ordering};
 use std::cell::{Cell, UnsafeCell};
 use std::ptr;
 use std::sync::Arc;
 
 use types::{AgentId, Time};
 
-use crate::agent::Fault;
 use crate::door::{Door, bit_of};
 use crate::names::Directory;
 use crate::trace;
@@ -78,10 +78,17 @@ pub(crate) struct Context {
     owed_len: Cell<usize>,
     log: UnsafeCell<Option<trace::Writer>>,
     panic: Cell<PanicRecord>,
-    fault: Cell<Option<Fault>>,
     in_step: Cell<bool>,
+    /// The number of the step, times two: no other step of the process has it. Zero is none.
+    step: Cell<u64>,
+    /// Of how many inputs the step has taken messages without seeing them empty since.
+    open: Cell<u32>,
     directory: Arc<Directory>,
 }
+
+/// How many threads there have been, and room for the number of the steps of each.
+static CONTEXTS: AtomicU64 = AtomicU64::new(1);
+const STEPS: u32 = 44;
 
 thread_local! {
     static CURRENT: Cell<*const Context> = const { Cell::new(ptr::null()) };
@@ -117,8 +124,9 @@ impl Context {
             owed_len: Cell::new(0),
             log: UnsafeCell::new(log),
             panic: Cell::new(PanicRecord::EMPTY),
-            fault: Cell::new(None),
             in_step: Cell::new(false),
+            step: Cell::new(CONTEXTS.fetch_add(1, Ordering::Relaxed) << STEPS),
+            open: Cell::new(0),
             directory,
         })
     }
@@ -129,24 +137,64 @@ impl Context {
         Entered(())
     }
 
+    /// The steps that follow are those of agents of this executor.
+    #[inline]
+    pub(crate) fn enter_executor(&self, executor: u32) {
+        self.executor.set(executor);
+    }
+
     /// Begins a step.
     #[inline]
-    pub(crate) fn begin(&self, agent: AgentId, now: Time, executor: u32) {
+    pub(crate) fn begin(&self, agent: AgentId, now: Time) {
         self.now.set(now);
         self.agent.set(agent);
-        self.alarm.set(Time::NEVER);
-        self.executor.set(executor);
         self.in_step.set(true);
+        self.step.set(self.step.get() + 2);
+        self.open.set(0);
+    }
+
+    /// A message was taken from an input that keeps `opened` for this: the step in which that happened last, odd while it was not seen
+    /// empty since.
+    #[inline(always)]
+    pub(crate) fn took(&self, opened: &mut u64) {
+        let open = self.step.get() | 1;
+        if *opened != open {
+            *opened = open;
+            self.open.set(self.open.get() + 1);
+        }
+    }
+
+    /// The same input has no message left. What comes later says so itself.
+    #[inline(always)]
+    pub(crate) fn drained(&self, opened: &mut u64) {
+        if *opened == self.step.get() | 1 {
+            *opened = self.step.get();
+            self.open.set(self.open.get() - 1);
+        }
+    }
+
+    /// The number of the step, and whether it has taken messages from an input where some may be left.
+    #[inline]
+    pub(crate) fn left_open(&self) -> (u64, bool) {
+        (self.step.get(), self.open.get() > 0)
     }
 
     /// Ends a step: makes the wake-ups that it owes, each door once. Gives the time for which the agent asked to be woken.
     #[inline]
-    pub(crate) fn end(&self) -> Time {
+    pub(crate) fn end(&self) -> Option<Time> {
         self.in_step.set(false);
         if self.owed_len.get() > 0 {
             self.ring_doors();
         }
-        self.alarm.get()
+        if self.alarm.get() == Time::NEVER {
+            return None;
+        }
+        Some(self.alarm.replace(Time::NEVER))
+    }
+
+    /// Whether an agent's own code is being run.
+    pub(crate) fn is_in_step(&self) -> bool {
+        self.in_step.get()
     }
 
     fn ring_doors(&self) {
@@ -162,17 +210,6 @@ impl Context {
     #[inline]
     pub(crate) fn take_woken(&self) -> Option<&[Cell<u32>]> {
         self.woken.get(..self.woken_len.take())
-    }
-
-    /// Keeps what a step reports, until it is known whose its agent is now.
-    #[cold]
-    pub(crate) fn set_fault(&self, fault: Fault) {
-        self.fault.set(Some(fault));
-    }
-
-    /// What the step reported.
-    pub(crate) fn take_fault(&self) -> Option<Fault> {
-        self.fault.take()
     }
 
     #[inline]

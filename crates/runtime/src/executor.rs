@@ -39,31 +39,35 @@ pub(crate) struct Timing {
     pub hang_after: Duration,
 }
 
-/// An agent's place in an executor.
+/// An agent's place in an executor. What every step uses stands together.
+#[repr(C, align(64))]
 pub(crate) struct Seat {
-    pub id: AgentId,
-    pub name: Name,
+    /// It stays here in a step, too: then only the thread that makes the step uses it.
     pub body: Option<Box<dyn Body>>,
-    /// The agent when all were stopped: it is not run any more.
-    pub at_rest: Option<Box<dyn Body>>,
     /// The inputs whose messages make it run.
     pub on: Vec<Arc<dyn InputEnd>>,
-    /// Whether any of them takes messages out of a queue.
+    pub stats: Arc<AgentStats>,
+    pub id: AgentId,
+    /// Whether the body is in a step.
+    pub in_step: bool,
+    pub started: bool,
+    pub fault: StepFault,
+    /// Whether any of its inputs takes messages out of a queue.
     pub serves: bool,
     pub timing: Timing,
-    pub stats: Arc<AgentStats>,
-    pub next_release: Time,
-    /// Whether its time has come and its step has not begun: it is among those that are due, once.
-    pub is_due: bool,
     /// The step that the agent asked for.
     pub alarm: Time,
     /// The step that a message asked for too soon after the last one: when it may be. The next step is that one, whatever for.
     pub put_off: Time,
     pub last_step: Time,
-    pub started: bool,
-    pub fault: StepFault,
+    pub next_release: Time,
+    /// Whether its time has come and its step has not begun: it is among those that are due, once.
+    pub is_due: bool,
     /// Whether the agent is in a step that does not return. Its ends may be in use there, so nobody touches them; it gets others.
     pub lost: bool,
+    pub name: Name,
+    /// The agent when all were stopped: it is not run any more.
+    pub at_rest: Option<Box<dyn Body>>,
 }
 
 /// How an agent misbehaves on request.
@@ -133,11 +137,9 @@ type Due = BinaryHeap<Reverse<(Time, u32, u32, Time)>>;
 pub(crate) struct Core {
     pub number: u32,
     pub seats: Vec<Option<Box<Seat>>>,
-    order: Vec<u32>,
     ready: ReadySet,
     releases: Releases,
     due: Due,
-    cursor: u32,
     pub door: Arc<Door>,
     pub running: Arc<Running>,
     changes: ring::Receiver<Option<(u64, Change)>>,
@@ -175,11 +177,9 @@ impl Core {
         let core = Core {
             number,
             seats: Vec::new(),
-            order: Vec::new(),
             ready: ReadySet::default(),
             releases: BinaryHeap::with_capacity(SPARE_ALARMS),
             due: BinaryHeap::new(),
-            cursor: 0,
             door: door.clone(),
             running: running.clone(),
             changes,
@@ -247,9 +247,7 @@ impl Core {
             return Some(job);
         }
         loop {
-            let rank = self.ready.take(self.cursor)?;
-            self.cursor = rank + 1;
-            let slot = *self.order.get(rank as usize)?;
+            let slot = self.ready.take()?;
             let Some(seat) = self.seats.get(slot as usize).and_then(Option::as_deref) else { continue };
             let deadline = now.saturating_add(seat.timing.deadline);
             if seat.timing.min_gap > Duration::ZERO && self.is_put_off(slot, now) {
@@ -346,15 +344,16 @@ impl Core {
         self.releases.push(Reverse((time, slot)));
     }
 
-    /// Takes an agent that does not come back from its step, or its stop, for dead. Its body is lost to that; in simulated time it
-    /// is still here, and goes to the control side. From here on nobody touches its ends: the thread that lost it may.
+    /// Takes an agent that does not come back from its step, or its stop, for dead. Its body is left to the thread that is in the step; where
+    /// the step was only played, it goes to the control side. From here on nobody touches its ends: the thread that lost it may.
     pub(crate) fn give_up(&mut self, slot: u32, now: Time) {
         let Some(seat) = self.seats.get_mut(slot as usize).and_then(Option::as_mut) else { return };
         bump(&seat.stats.hangs);
         (seat.lost, seat.serves) = (true, false);
         seat.on.clear();
         let cause = if self.changing.is_some() { RawCause::Stop } else { RawCause::Hang };
-        let died = Answer::Died { slot, id: seat.id, time: now, cause, body: seat.body.take() };
+        let body = seat.leave_behind();
+        let died = Answer::Died { slot, id: seat.id, time: now, cause, body };
         self.answer(died);
         if let Some(number) = self.changing.take() {
             self.answer(Answer::Lost(number, None));

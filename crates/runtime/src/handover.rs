@@ -48,19 +48,24 @@ impl Running {
         Running { allocations: self.allocations.clone(), ..Running::default() }
     }
 
-    /// A step begins. Only the thread that has the core may say so.
+    /// How many steps there were, modulo 2³². The thread that has the core counts them.
     #[inline]
-    pub(crate) fn begin(&self, slot: u32) {
-        let count = (self.step.load(Ordering::Relaxed) >> 32) + 1;
+    pub(crate) fn count(&self) -> u32 {
+        (self.step.load(Ordering::Relaxed) >> 32) as u32
+    }
+
+    /// The step with this number begins, which is the next one. Only the thread that has the core may say so.
+    #[inline]
+    pub(crate) fn begin(&self, count: u32, slot: u32) {
         // Release: who gives this step up has seen what was done before it. Pairs with the barrier in `Owner::take_from`.
         let ordering = named("hand-over: step begins", Ordering::Release);
-        self.step.store(count << 32 | u64::from(slot + 1), ordering);
+        self.step.store(u64::from(count) << 32 | u64::from(slot + 1), ordering);
     }
 
     /// It ended.
     #[inline]
-    pub(crate) fn end(&self) {
-        self.step.store(self.step.load(Ordering::Relaxed) >> 32 << 32, Ordering::Relaxed);
+    pub(crate) fn end(&self, count: u32) {
+        self.step.store(u64::from(count) << 32, Ordering::Relaxed);
     }
 
     /// The step that is going on. What is said of it in the other words is that of this step or a later one.
@@ -169,12 +174,12 @@ mod model {
             Arc::new(Core { owner: Owner::new(1), running: Running::default(), work: UnsafeCell::new(0) });
         let first = core.clone();
         let worker = thread::spawn(move || {
-            (0..count).all(|_| {
+            (1..=count as u32).all(|step| {
                 touch(&first);
                 let running = &first.running;
-                running.begin(0);
+                running.begin(step, 0);
                 // Here is the step, which touches nothing of the core.
-                running.end();
+                running.end(step);
                 light_barrier();
                 let keeps = first.owner.keeps(1);
                 if keeps {

@@ -187,8 +187,8 @@ pub(crate) trait InputEnd: Any + Send + Sync {
     fn leaving_box(&self) -> Box<dyn Any + Send>;
     /// Whether any message waits.
     fn has_message(&self) -> bool;
-    /// After a step: what it did with the messages that waited.
-    fn settle(&self) -> Settled;
+    /// After the step with this number: what it did with the messages that waited.
+    fn settle(&self, step: u64) -> Settled;
     /// Before a step of an agent that takes messages out of a queue: nobody counts on it meanwhile.
     fn begin_step(&self);
     /// Whether it takes messages out of a queue.

@@ -165,17 +165,20 @@ impl<T> Sender<T> {
     /// else answers [`Pushed::Full`] without calling `fill`.
     #[inline(always)]
     pub(crate) fn push(&mut self, fill: impl FnOnce(&mut T)) -> Pushed {
-        if self.0.displaces {
-            return self.push_displacing(fill);
-        }
         let end = &mut self.0;
-        // Pairs with the release in `Receiver::advance`.
-        let old = end.entry().load(named("ring: refuse, look", Ordering::Acquire));
-        if old & FULL != 0 {
-            return Pushed::Full;
+        let mut old = 0;
+        if !end.displaces {
+            // Pairs with the release in `Receiver::advance`.
+            old = end.entry().load(named("ring: refuse, look", Ordering::Acquire));
+            if old & FULL != 0 {
+                return Pushed::Full;
+            }
         }
         // SAFETY: the slot is this end's own.
         end.place().with_mut(|place| fill(unsafe { &mut *place }));
+        if end.displaces {
+            return self.put_displacing();
+        }
         // Pairs with the acquire in `Receiver::advance`. An empty entry is the sender's to change. Nobody laps, so no position.
         end.entry().store(full(end.slot, 0), named("ring: refuse, put", Ordering::Release));
         end.slot = slot_of(old);
@@ -183,11 +186,10 @@ impl<T> Sender<T> {
         Pushed::Stored
     }
 
+    /// Sends what this end's slot was filled with, where the oldest message makes room.
     #[inline(never)]
-    fn push_displacing(&mut self, fill: impl FnOnce(&mut T)) -> Pushed {
+    fn put_displacing(&mut self) -> Pushed {
         let end = &mut self.0;
-        // SAFETY: the slot is this end's own.
-        end.place().with_mut(|place| fill(unsafe { &mut *place }));
         // Release pairs with the acquire in `Receiver::advance`, for what was filled; acquire pairs with its release,
         // for the slot that comes back.
         let ordering = named("ring: displace", Ordering::AcqRel);

@@ -590,11 +590,13 @@ fn run_core(
 /// On request, an agent that does not return: the thread keeps its processor until the watchdog has given it up. Says whether
 /// the core is still this thread's.
 fn hang(cell: &Cell, number: u32, slot: u32) -> bool {
-    cell.running().since.store(os::ticks(), Ordering::Relaxed);
-    cell.running().begin(slot);
+    let running = cell.running();
+    running.since.store(os::ticks(), Ordering::Relaxed);
+    let count = running.count().wrapping_add(1);
+    running.begin(count, slot);
     while cell.owner.is_still(number) {
         if cell.stop.load(Ordering::Acquire) {
-            cell.running().end();
+            running.end(count);
             return cell.owner.keeps(number);
         }
         core::hint::spin_loop();

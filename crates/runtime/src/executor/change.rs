@@ -285,7 +285,7 @@ impl Core {
                 }
             }
             Change::Order { order, ranks, words, releases, due } => {
-                self.reorder(order, ranks, words);
+                self.ready.set_order(order, ranks, words);
                 if releases.capacity() > self.releases.capacity() {
                     // One by one: `append` would exchange the two when this one is longer, and the room would go back.
                     releases.extend(self.releases.drain());
@@ -326,7 +326,8 @@ impl Core {
             }
             Change::OutputFault { end, faulty, .. } => end.set_fault(faulty.as_mut()),
             Change::Send { end, message, envelope, .. } => {
-                context.begin(AgentId::NONE, now, self.number);
+                context.enter_executor(self.number);
+                context.begin(AgentId::NONE, now);
                 end.send_prepared(envelope, message.as_ref());
                 context.end();
                 self.mark_woken(context);
@@ -359,18 +360,6 @@ impl Core {
         if next < Time::NEVER {
             self.push_release(next, slot);
         }
-    }
-
-    fn reorder(&mut self, order: &mut Vec<u32>, ranks: &mut Vec<u32>, words: &mut Vec<u64>) {
-        for rank in self.ready.iter() {
-            let slot = self.order[rank as usize];
-            if let Some(new) = ranks.get(slot as usize).copied().filter(|rank| *rank != u32::MAX) {
-                words[new as usize / 64] |= 1 << (new % 64);
-            }
-        }
-        core::mem::swap(&mut self.order, order);
-        self.ready.set_order(ranks, words);
-        self.cursor = 0;
     }
 }
 
@@ -455,11 +444,12 @@ impl Visit<'_> {
             let Some(seat) = core.seats.get(slot as usize).and_then(Option::as_ref) else {
                 return Some(Ok(()));
             };
-            self.context.begin(seat.id, self.now, core.number);
+            self.context.enter_executor(core.number);
+            self.context.begin(seat.id, self.now);
             core.running.limit.store(seat.timing.hang_after.0 as u64, Ordering::Relaxed);
             core.running.since.store(os::ticks(), Ordering::Relaxed);
             core.running.agent.store(seat.id.0, Ordering::Relaxed);
-            core.running.begin(slot);
+            core.running.begin(core.running.count().wrapping_add(1), slot);
             let step = Step { now: self.now, deadline: self.now, agent: seat.id, period: seat.timing.period };
             (step, Arc::as_ptr(&core.running))
         };
@@ -467,7 +457,8 @@ impl Visit<'_> {
         let result = catch_unwind(AssertUnwindSafe(|| work(&mut step)));
         *foreign += allocations::so_far() - before;
         // SAFETY: the figures outlive the core, whoever has it.
-        unsafe { &*running }.end();
+        let running = unsafe { &*running };
+        running.end(running.count());
         // As at the end of a step.
         light_barrier();
         if !(self.still_mine)() {
@@ -556,11 +547,7 @@ impl Visit<'_> {
         };
         core::mem::swap(&mut seat.body, body);
         seat.started = false;
-        // What the one before took is not its own doing.
-        let mut has_message = false;
-        for input in &seat.on {
-            has_message |= input.settle().left;
-        }
+        let has_message = seat.on.iter().any(|input| input.has_message());
         if seat.serves {
             let why = if seat.body.is_some() { Rest::Ready } else { Rest::Away };
             core.rest(slot, why);

@@ -14,6 +14,7 @@ use super::{
     Direction, InputEnd, OutputEnd, Parcel, Port, PortEnds, PortOptions, PortShape, Settled, WireCounts,
     WireId, count, output_core,
 };
+use crate::context::current;
 use crate::memory::{Found, Link, Pin, Seat};
 use crate::message_type::MessageType;
 use crate::{queue, ring};
@@ -69,9 +70,8 @@ pub(super) struct InputInner<T: Message> {
     pub(super) lanes: Vec<Lane<T>>,
     /// Whether any lane is one of a queue.
     serves: bool,
-    taken: u64,
-    /// How many had been taken after the last step.
-    settled: u64,
+    /// The step in which something was taken last, as [`Context::took`] keeps it.
+    opened: u64,
     /// The lane that gave the last message, while all are passed over for the newest.
     last: Option<usize>,
 }
@@ -140,14 +140,9 @@ impl<T: Message> InputEnd for InputCore<T> {
         self.inner().has_message()
     }
 
-    fn settle(&self) -> Settled {
+    fn settle(&self, step: u64) -> Settled {
         let inner = self.inner();
-        let took = inner.taken != inner.settled;
-        inner.settled = inner.taken;
-        if let [Lane { source: Source::Value(receiver), staged, .. }] = &inner.lanes[..] {
-            return Settled { took, left: *staged || receiver.has_message() };
-        }
-        Settled { took, left: inner.has_message() }
+        Settled { took: inner.opened & !1 == step, left: inner.has_message() }
     }
 
     fn begin_step(&self) {
@@ -249,10 +244,16 @@ impl<T: Message> Input<T> {
         if let [lane] = &mut inner.lanes[..]
             && let Source::Value(receiver) = &mut lane.source
         {
+            let context = current();
             if !core::mem::take(&mut lane.staged) && !receiver.advance() {
+                if let Some(context) = context {
+                    context.drained(&mut inner.opened);
+                }
                 return None;
             }
-            inner.taken += 1;
+            if let Some(context) = context {
+                context.took(&mut inner.opened);
+            }
             count(&lane.counts.taken);
             let parcel = receiver.current();
             return Some(Received { header: &parcel.header, place: Place::Value(&parcel.payload) });
@@ -264,7 +265,7 @@ impl<T: Message> Input<T> {
     pub fn newest(&mut self) -> Option<Received<'_, T>> {
         let inner = self.core.as_ref()?.inner();
         while let Some(lane) = inner.next() {
-            inner.taken += 1;
+            inner.note_taken();
             inner.last = Some(lane);
             count(&inner.lanes[lane].counts.taken);
         }
@@ -314,7 +315,7 @@ impl<T: Message> InputInner<T> {
             let lane: *const Lane<T> = &raw const self.lanes[lane];
             // SAFETY: lanes change only between steps; `&mut self` keeps the message from being taken twice.
             if let Some(received) = unsafe { &*lane }.current() {
-                self.taken += 1;
+                self.note_taken();
                 return Some(received);
             }
         }
@@ -323,6 +324,12 @@ impl<T: Message> InputInner<T> {
     #[inline]
     fn has_message(&self) -> bool {
         self.lanes.iter().any(|lane| lane.staged || lane.source.has_message())
+    }
+
+    fn note_taken(&mut self) {
+        if let Some(context) = current() {
+            context.took(&mut self.opened);
+        }
     }
 
     fn count_queues(&mut self) {
@@ -397,13 +404,7 @@ impl<T: Message> Lane<T> {
 /// Makes the mailbox of an input of type `T`.
 pub(crate) fn input_core<T: Message>() -> Arc<InputCore<T>> {
     Arc::new(InputCore {
-        inner: UnsafeCell::new(InputInner {
-            lanes: Vec::new(),
-            serves: false,
-            taken: 0,
-            settled: 0,
-            last: None,
-        }),
+        inner: UnsafeCell::new(InputInner { lanes: Vec::new(), serves: false, opened: 0, last: None }),
     })
 }
 

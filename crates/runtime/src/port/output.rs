@@ -25,18 +25,27 @@ use crate::message_type::{self, MessageType};
 use crate::queue;
 use crate::ring::{self, Overload, Pushed};
 
-/// The sending ends of a wire: a ring for each priority that the output uses.
+/// The sending end of a wire.
 pub(super) struct Route<T: Message> {
-    pub(super) wire: WireId,
-    pub(super) filter: Filter,
-    pub(super) passed: u32,
-    pub(super) overload: Overload,
-    pub(super) values: Vec<(Priority, ring::Sender<Parcel<T>>)>,
-    pub(super) links: Vec<(Priority, ring::Sender<Parcel<Link>>)>,
     pub(super) target: Target,
     pub(super) counts: Arc<WireCounts>,
-    /// In the place of the rings where it leads to a queue. It goes last: while somebody counts here its places are not given to others.
-    pub(super) queue: Option<Box<queue::Sender<Parcel<T>>>>,
+    pub(super) overload: Overload,
+    /// Whether its filter lets all through.
+    takes_all: bool,
+    pub(super) wire: WireId,
+    filter: Filter,
+    passed: u32,
+    /// It goes last: while somebody counts here, the places of a queue are not given to others.
+    pub(super) way: Way<T>,
+}
+
+/// Where a message is put: rings of values or of links, one for each priority that the output uses, or a queue.
+pub(super) enum Way<T: Message> {
+    /// Most outputs use one priority.
+    Value(ring::Sender<Parcel<T>>),
+    Values(Vec<(Priority, ring::Sender<Parcel<T>>)>),
+    Links(Vec<(Priority, ring::Sender<Parcel<Link>>)>),
+    Queue(Box<queue::Sender<Parcel<T>>>),
 }
 
 pub(super) struct NewRoute<T: Message> {
@@ -44,15 +53,17 @@ pub(super) struct NewRoute<T: Message> {
     pub(super) room: Vec<Route<T>>,
 }
 
+/// What every message uses stands first, together.
+#[repr(C)]
 struct OutputInner<T: Message> {
-    sender: AgentId,
-    sequence: u64,
     routes: Vec<Route<T>>,
-    memory: Option<memory::Writer<T>>,
-    /// How it misbehaves, if it does.
-    faulty: Option<Box<Faulty<T>>>,
+    sequence: u64,
+    sender: AgentId,
     /// Whether it has one wire with one priority, which takes all messages as they are: most outputs do.
     is_plain: bool,
+    /// How it misbehaves, if it does.
+    faulty: Option<Box<Faulty<T>>>,
+    memory: Option<memory::Writer<T>>,
 }
 
 impl<T: Message> OutputInner<T> {
@@ -60,20 +71,21 @@ impl<T: Message> OutputInner<T> {
     fn changed(&mut self) {
         self.is_plain = self.memory.is_none()
             && self.faulty.is_none()
-            && matches!(&self.routes[..], [only] if only.values.len() == 1 && only.takes_all());
+            && matches!(&self.routes[..], [Route { takes_all: true, way: Way::Value(_), .. }]);
     }
 }
 
 /// The routes behind an output.
+#[repr(C)]
 pub(crate) struct OutputCore<T: Message> {
+    log_every: AtomicU64,
+    sent: AtomicU64,
     inner: UnsafeCell<OutputInner<T>>,
+    log_number: AtomicU64,
     /// What the readers of its memory share, and on how many seats: the memory of an output is never replaced.
     shared: Option<(Arc<memory::Shared<T>>, usize)>,
     /// The greatest length of the row of a message.
     rows: usize,
-    log_number: AtomicU64,
-    log_every: AtomicU64,
-    sent: AtomicU64,
 }
 
 // SAFETY: as for `InputCore`: routes are touched only by the thread that runs the executor.
@@ -126,17 +138,15 @@ impl<T: Message> OutputEnd for OutputCore<T> {
         }
         let room = Vec::with_capacity(lanes + new_lanes.len());
         let lanes = Box::new(NewLanes { lanes: new_lanes, room });
-        let route = Route {
-            wire: spec.id,
-            filter: spec.filter,
-            passed: 0,
-            overload: spec.overload,
-            values,
-            links,
-            queue: None,
-            target: spec.target.clone(),
-            counts: spec.counts.clone(),
+        let way = match self.shared {
+            Some(_) => Way::Links(links),
+            None if values.len() == 1 => {
+                values.pop().map_or(Way::Values(values), |(_, only)| Way::Value(only))
+            }
+            None => Way::Values(values),
         };
+        let WireSpec { id, filter, overload, target, counts, .. } = spec;
+        let route = Route::new(*id, *filter, *overload, target.clone(), counts.clone(), way);
         let route = Box::new(NewRoute { route: Some(route), room: Vec::with_capacity(routes + 1) });
         Ok(PreparedWire { route, lanes })
     }
@@ -326,10 +336,11 @@ impl<T: Message> Output<T> {
     /// Whether every wire has room for a message of normal priority without losing another.
     pub fn has_room(&self) -> bool {
         self.core.as_ref().is_none_or(|core| {
-            core.inner().routes.iter().all(|route| {
-                route.values.iter().all(|(_, ring)| ring.has_room())
-                    && route.links.iter().all(|(_, ring)| ring.has_room())
-                    && route.queue.as_deref().is_none_or(queue::Sender::has_room)
+            core.inner().routes.iter().all(|route| match &route.way {
+                Way::Value(ring) => ring.has_room(),
+                Way::Values(rings) => rings.iter().all(|(_, ring)| ring.has_room()),
+                Way::Links(rings) => rings.iter().all(|(_, ring)| ring.has_room()),
+                Way::Queue(queue) => queue.has_room(),
             })
         })
     }
@@ -368,7 +379,7 @@ impl<T: Message> OutputCore<T> {
         if inner.is_plain
             && self.log_every.load(Ordering::Relaxed) == 0
             && let [route] = &mut inner.routes[..]
-            && let [(_, ring)] = &mut route.values[..]
+            && let Way::Value(ring) = &mut route.way
         {
             let pushed = ring.push(|parcel| {
                 // Word by word: a header that is put together elsewhere and copied here takes longer than the payload.
@@ -476,14 +487,14 @@ impl<T: Message> OutputCore<T> {
         self.log(header, head, &row[..len], context);
         if !is_large::<T>() {
             // Into a queue goes the message itself.
-            for route in inner.routes.iter_mut().filter(|route| route.queue.is_some()) {
+            for route in inner.routes.iter_mut().filter(|route| route.leads_to_queue()) {
                 if route.lets_pass(header) {
                     route.put_value(header, |place| *place = *head, &mut sent, context);
                 }
             }
         }
         let link = loan.publish(*header, len);
-        for route in inner.routes.iter_mut().filter(|route| route.queue.is_none()) {
+        for route in inner.routes.iter_mut().filter(|route| !route.leads_to_queue()) {
             if route.lets_pass(header) {
                 route.put_link(header, link, &mut sent, context);
             }
@@ -543,12 +554,28 @@ impl<T: Message> Drop for Restored<T> {
 }
 
 impl<T: Message> Route<T> {
-    fn takes_all(&self) -> bool {
-        self.filter.every <= 1 && Filter { every: 0, ..self.filter } == Filter::ALL
+    pub(super) fn new(
+        wire: WireId,
+        filter: Filter,
+        overload: Overload,
+        target: Target,
+        counts: Arc<WireCounts>,
+        way: Way<T>,
+    ) -> Route<T> {
+        let takes_all = filter.every <= 1 && Filter { every: 0, ..filter } == Filter::ALL;
+        Route { target, counts, overload, takes_all, wire, filter, passed: 0, way }
+    }
+
+    fn leads_to_queue(&self) -> bool {
+        matches!(self.way, Way::Queue(_))
     }
 
     #[inline]
     fn lets_pass(&mut self, header: &Header) -> bool {
+        self.takes_all || self.filter_passes(header)
+    }
+
+    fn filter_passes(&mut self, header: &Header) -> bool {
         if !self.filter.passes(header) {
             return false;
         }
@@ -567,7 +594,12 @@ impl<T: Message> Route<T> {
         sent: &mut Sent,
         context: Option<&Context>,
     ) {
-        let pushed = match lane_for(&mut self.values, header.priority) {
+        let ring = match &mut self.way {
+            Way::Value(ring) => Some(ring),
+            Way::Values(rings) => lane_for(rings, header.priority),
+            Way::Links(_) | Way::Queue(_) => None,
+        };
+        let pushed = match ring {
             Some(ring) => ring.push(|parcel| {
                 parcel.header = *header;
                 fill(&mut parcel.payload);
@@ -578,7 +610,11 @@ impl<T: Message> Route<T> {
     }
 
     fn put_link(&mut self, header: &Header, link: Link, sent: &mut Sent, context: Option<&Context>) {
-        let pushed = match lane_for(&mut self.links, header.priority) {
+        let ring = match &mut self.way {
+            Way::Links(rings) => lane_for(rings, header.priority),
+            _ => None,
+        };
+        let pushed = match ring {
             Some(ring) => ring.push(|parcel| *parcel = Parcel { header: *header, payload: link }),
             None => Pushed::Full,
         };

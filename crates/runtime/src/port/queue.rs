@@ -9,7 +9,7 @@ use types::message::is_large;
 use types::{Filter, Header, Message, Priority};
 
 use super::input::{InputInner, Lane, NewLanes, Source};
-use super::output::{NewRoute, Route};
+use super::output::{NewRoute, Route, Way};
 use super::{Parcel, Target, WireCounts, WireId};
 use crate::context::Context;
 use crate::door::Door;
@@ -98,17 +98,9 @@ impl<T: Message> QueueEnd for QueueCore<T> {
         let rings = sender.rings();
         // Whom a message wakes is found out for each one.
         let target = Target { executor: 0, slot: 0, door: self.form.doors.first()?.clone(), wakes: false };
-        let route = Route::<T> {
-            wire: wire.id,
-            filter: wire.filter,
-            passed: 0,
-            overload: self.form.overload,
-            values: Vec::new(),
-            links: Vec::new(),
-            queue: Some(Box::new(sender)),
-            target,
-            counts: wire.counts.clone(),
-        };
+        let way = Way::Queue(Box::new(sender));
+        let route =
+            Route::<T>::new(wire.id, wire.filter, self.form.overload, target, wire.counts.clone(), way);
         Some((Box::new(NewRoute { route: Some(route), room: Vec::with_capacity(routes + 1) }), rings))
     }
 
@@ -160,7 +152,7 @@ impl<T: Message> Route<T> {
         fill: impl FnOnce(&mut T),
         context: Option<&Context>,
     ) -> Pushed {
-        let Some(queue) = &mut self.queue else { return Pushed::Full };
+        let Way::Queue(queue) = &mut self.way else { return Pushed::Full };
         let put = |parcel: &mut Parcel<T>| {
             parcel.header = *header;
             fill(&mut parcel.payload);

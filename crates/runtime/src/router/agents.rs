@@ -97,6 +97,7 @@ impl Router {
             name: Name::new(&known.plan.name),
             body,
             at_rest: None,
+            in_step: false,
             on: known.on(),
             serves: false,
             timing: known.timing,

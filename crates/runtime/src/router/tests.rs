@@ -196,7 +196,8 @@ impl World {
         let mut out = Output::<Twist>::default();
         out.bind(end);
         let _entered = self.context.enter();
-        self.context.begin(AgentId::NONE, self.now, u32::MAX);
+        self.context.enter_executor(u32::MAX);
+        self.context.begin(AgentId::NONE, self.now);
         let sent = out.send(Twist::ZERO);
         self.context.end();
         sent.taken + sent.refused

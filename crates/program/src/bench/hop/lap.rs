@@ -2,7 +2,7 @@
 //!
 //! An iteration is a whole lap, five steps and five messages, each released, timed and counted as always; a hop is timed from the
 //! source's step to the sink's. While the laps go on, one of their outputs and one of their mailboxes get another wire and lose
-//! it again, many times.
+//! it again, many times; each is there only for as long as the requests take, or the lap would be one of more messages.
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
@@ -25,8 +25,8 @@ use crate::terminal::pause;
 /// Iterations of one run, and rounds.
 const ITERATIONS: usize = 100_000;
 const ROUNDS: usize = 5;
-/// How long a wire that comes and goes stays, and stays away.
-const STAYS: Pause = Pause::from_millis(2);
+/// How long a wire that comes and goes stays away.
+const STAYS_AWAY: Pause = Pause::from_millis(2);
 /// The pace at which a robot might send, and messages at that pace.
 const PACE: Duration = Duration::millis(1);
 const PACED: usize = 1000;
@@ -141,8 +141,8 @@ fn rewire(control: &Control, over: &AtomicBool) -> Result<usize, Failure> {
                 Err(_) if over.load(Ordering::Acquire) => return Ok(times),
                 Err(refusal) => return Err(Failure::new(refusal.to_string()).code(1)),
             }
-            pause(STAYS);
         }
+        pause(STAYS_AWAY);
     }
     Ok(times)
 }

@@ -221,7 +221,8 @@ fn the_calls_of_a_sender_that_is_lost_are_made() {
     {
         // It sends in a step that does not end.
         let _entered = world.context.enter();
-        world.context.begin(id, world.now, executor as u32);
+        world.context.enter_executor(executor as u32);
+        world.context.begin(id, world.now);
         let mut go = Output::<Twist>::default();
         go.bind(&ends[1]);
         go.send(Twist::ZERO);
