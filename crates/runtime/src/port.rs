@@ -7,6 +7,7 @@ mod faulty;
 mod input;
 mod output;
 mod queue;
+mod route;
 
 use core::sync::atomic::{AtomicU64, Ordering};
 use std::any::Any;
@@ -271,6 +272,7 @@ struct Parcel<P> {
 
 pub use input::{Input, Received};
 pub(crate) use input::{InputCore, downcast_input, input_core};
-pub use output::{Envelope, Output, Sent};
+pub use output::{Envelope, Output};
 pub(crate) use output::{OutputCore, downcast_output, output_core};
 pub(crate) use queue::{QueueEnd, QueueForm, QueueWire, Rest, Teller};
+pub use route::Sent;

@@ -10,43 +10,20 @@ use std::sync::Arc;
 use types::cdr::NoElement;
 use types::chance::Stream;
 use types::message::is_large;
-use types::{AgentId, Category, Filter, Header, Message, Priority, Time};
+use types::{AgentId, Category, Header, Message, Priority, Time};
 
 use super::faulty::Faulty;
 use super::input::{Lane, NewLanes, Source};
 use super::queue::{QueueEnd, QueueForm, queue_core};
+use super::route::{Route, Sent, Way};
 use super::{
-    Direction, InputEnd, NoSeat, OutputEnd, OutputFault, Parcel, Port, PortEnds, PortOptions, PortShape,
-    PreparedWire, Target, WireCounts, WireId, WireSpec, count, input_core,
+    Direction, InputEnd, NoSeat, OutputEnd, OutputFault, Port, PortEnds, PortOptions, PortShape,
+    PreparedWire, WireId, WireSpec, input_core,
 };
 use crate::context::{Context, current};
-use crate::memory::{self, Link, Seat};
+use crate::memory::{self, Seat};
 use crate::message_type::{self, MessageType};
-use crate::queue;
-use crate::ring::{self, Overload, Pushed};
-
-/// The sending end of a wire.
-pub(super) struct Route<T: Message> {
-    pub(super) target: Target,
-    pub(super) counts: Arc<WireCounts>,
-    pub(super) overload: Overload,
-    /// Whether its filter lets all through.
-    takes_all: bool,
-    pub(super) wire: WireId,
-    filter: Filter,
-    passed: u32,
-    /// It goes last: while somebody counts here, the places of a queue are not given to others.
-    pub(super) way: Way<T>,
-}
-
-/// Where a message is put: rings of values or of links, one for each priority that the output uses, or a queue.
-pub(super) enum Way<T: Message> {
-    /// Most outputs use one priority.
-    Value(ring::Sender<Parcel<T>>),
-    Values(Vec<(Priority, ring::Sender<Parcel<T>>)>),
-    Links(Vec<(Priority, ring::Sender<Parcel<Link>>)>),
-    Queue(Box<queue::Sender<Parcel<T>>>),
-}
+use crate::ring::{self, Overload};
 
 pub(super) struct NewRoute<T: Message> {
     pub(super) route: Option<Route<T>>,
@@ -71,7 +48,7 @@ impl<T: Message> OutputInner<T> {
     fn changed(&mut self) {
         self.is_plain = self.memory.is_none()
             && self.faulty.is_none()
-            && matches!(&self.routes[..], [Route { takes_all: true, way: Way::Value(_), .. }]);
+            && matches!(&self.routes[..], [only] if only.is_plain());
     }
 }
 
@@ -252,15 +229,6 @@ impl Default for Envelope {
             priority: Priority::Normal,
         }
     }
-}
-
-/// What became of a message, wire by wire.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct Sent {
-    /// Wires that took it.
-    pub taken: u32,
-    /// Wires that gave it back because they were full.
-    pub refused: u32,
 }
 
 /// An end where messages of type `T` go out.
@@ -551,114 +519,6 @@ impl<T: Message> Drop for Restored<T> {
         // SAFETY: the place is in the output, which is borrowed for longer than the send lasts; nothing else goes there meanwhile.
         unsafe { *self.place = self.faulty.take() };
     }
-}
-
-impl<T: Message> Route<T> {
-    pub(super) fn new(
-        wire: WireId,
-        filter: Filter,
-        overload: Overload,
-        target: Target,
-        counts: Arc<WireCounts>,
-        way: Way<T>,
-    ) -> Route<T> {
-        let takes_all = filter.every <= 1 && Filter { every: 0, ..filter } == Filter::ALL;
-        Route { target, counts, overload, takes_all, wire, filter, passed: 0, way }
-    }
-
-    fn leads_to_queue(&self) -> bool {
-        matches!(self.way, Way::Queue(_))
-    }
-
-    #[inline]
-    fn lets_pass(&mut self, header: &Header) -> bool {
-        self.takes_all || self.filter_passes(header)
-    }
-
-    fn filter_passes(&mut self, header: &Header) -> bool {
-        if !self.filter.passes(header) {
-            return false;
-        }
-        if self.filter.every > 1 {
-            self.passed = (self.passed + 1) % self.filter.every;
-            return self.passed == 1;
-        }
-        true
-    }
-
-    #[inline]
-    fn put_value(
-        &mut self,
-        header: &Header,
-        fill: impl FnOnce(&mut T),
-        sent: &mut Sent,
-        context: Option<&Context>,
-    ) {
-        let ring = match &mut self.way {
-            Way::Value(ring) => Some(ring),
-            Way::Values(rings) => lane_for(rings, header.priority),
-            Way::Links(_) | Way::Queue(_) => None,
-        };
-        let pushed = match ring {
-            Some(ring) => ring.push(|parcel| {
-                parcel.header = *header;
-                fill(&mut parcel.payload);
-            }),
-            None => self.put_queued(header, fill, context),
-        };
-        *sent = self.account(pushed, *sent, context);
-    }
-
-    fn put_link(&mut self, header: &Header, link: Link, sent: &mut Sent, context: Option<&Context>) {
-        let ring = match &mut self.way {
-            Way::Links(rings) => lane_for(rings, header.priority),
-            _ => None,
-        };
-        let pushed = match ring {
-            Some(ring) => ring.push(|parcel| *parcel = Parcel { header: *header, payload: link }),
-            None => Pushed::Full,
-        };
-        *sent = self.account(pushed, *sent, context);
-    }
-
-    #[inline]
-    fn account(&mut self, pushed: Pushed, mut sent: Sent, context: Option<&Context>) -> Sent {
-        match pushed {
-            Pushed::Stored => {}
-            Pushed::Displaced => count(&self.counts.dropped),
-            Pushed::Full if self.overload == Overload::Refuse => {
-                count(&self.counts.refused);
-                sent.refused += 1;
-                return sent;
-            }
-            Pushed::Full => {
-                count(&self.counts.dropped);
-                return sent;
-            }
-        }
-        count(&self.counts.sent);
-        sent.taken += 1;
-        let target = &self.target;
-        if target.wakes
-            && let Some(context) = context
-        {
-            context.wake(target.executor, target.slot, &target.door);
-        }
-        sent
-    }
-}
-
-/// The ring for a priority: its own, or the next lower one that the output declares, or the lowest.
-#[inline]
-fn lane_for<P>(
-    lanes: &mut [(Priority, ring::Sender<Parcel<P>>)],
-    priority: Priority,
-) -> Option<&mut ring::Sender<Parcel<P>>> {
-    if let [(_, only)] = lanes {
-        return Some(only);
-    }
-    let at = lanes.iter().position(|(lane, _)| *lane <= priority).unwrap_or(lanes.len().checked_sub(1)?);
-    Some(&mut lanes[at].1)
 }
 
 /// Makes what stands behind an output of type `T`.

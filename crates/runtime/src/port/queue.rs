@@ -9,7 +9,8 @@ use types::message::is_large;
 use types::{Filter, Header, Message, Priority};
 
 use super::input::{InputInner, Lane, NewLanes, Source};
-use super::output::{NewRoute, Route, Way};
+use super::output::NewRoute;
+use super::route::{Route, Way};
 use super::{Parcel, Target, WireCounts, WireId};
 use crate::context::Context;
 use crate::door::Door;

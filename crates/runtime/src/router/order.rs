@@ -27,25 +27,23 @@ impl Router {
     /// The slots of an executor's agents so that senders stand before receivers; cycles are broken by name.
     pub(super) fn data_flow_order(&self, executor: usize) -> Vec<u32> {
         let slots = &self.executors[executor].slots;
-        let mut members: Vec<&Known> = slots.iter().flatten().filter_map(|id| self.agents.get(id)).collect();
-        members.sort_unstable_by(|a, b| a.plan.name.cmp(&b.plan.name));
+        let known = slots.iter().flatten().filter_map(|id| self.agents.get(id));
+        let mut members: Vec<(&str, &Known)> = known.map(|known| (known.plan.name.as_str(), known)).collect();
+        members.sort_unstable_by_key(|(name, _)| *name);
         let mut place = vec![usize::MAX; slots.len()];
-        for (i, member) in members.iter().enumerate() {
+        for (i, (_, member)) in members.iter().enumerate() {
             place[member.slot as usize] = i;
         }
-        let mut behind: Vec<Vec<usize>> = vec![Vec::new(); members.len()];
-        let mut before = vec![0usize; members.len()];
+        let mut flow = Flow::of(members.len());
         let mut goes_before = |from: &Known, to: AgentId| {
             if let Some(to) = self.agents.get(&to)
                 && to.executor == executor
                 && to.id != from.id
             {
-                let (a, b) = (place[from.slot as usize], place[to.slot as usize]);
-                behind[a].push(b);
-                before[b] += 1;
+                flow.add(place[from.slot as usize], place[to.slot as usize]);
             }
         };
-        for member in &members {
+        for (_, member) in &members {
             let wires = member.wires.iter().filter_map(|id| self.wires.get(id));
             let wires = wires.filter(|wire| wire.from.0 == member.id && !wire.is_answer);
             wires.for_each(|wire| goes_before(member, wire.to.0));
@@ -54,30 +52,94 @@ impl Router {
             let from = self.agents.get(&from).filter(|from| from.executor == executor);
             from.into_iter().for_each(|from| goes_before(from, to));
         }
-        // The first by name that waits for nobody; in a cycle, the first by name.
+        flow.in_order().map(|place| members[place].1.slot).collect()
+    }
+}
+
+/// Who goes before whom, by their places among all.
+struct Flow {
+    /// For each, the last of those behind it that were added; and for each of these the one added before.
+    last: Vec<usize>,
+    behind: Vec<(usize, usize)>,
+    /// How many go before each.
+    before: Vec<usize>,
+}
+
+/// Behind nobody.
+const NONE: usize = usize::MAX;
+
+impl Flow {
+    fn of(members: usize) -> Flow {
+        Flow { last: vec![NONE; members], behind: Vec::with_capacity(members), before: vec![0; members] }
+    }
+
+    fn add(&mut self, from: usize, to: usize) {
+        let at = self.behind.len();
+        self.behind.push((to, core::mem::replace(&mut self.last[from], at)));
+        self.before[to] += 1;
+    }
+
+    /// All, one after another: the first that waits for nobody; in a cycle, the first.
+    fn in_order(mut self) -> impl Iterator<Item = usize> {
         let mut free: BinaryHeap<Reverse<usize>> =
-            (0..members.len()).filter(|i| before[*i] == 0).map(Reverse).collect();
-        let mut done = vec![false; members.len()];
+            (0..self.before.len()).filter(|i| self.before[*i] == 0).map(Reverse).collect();
+        let mut done = vec![false; self.before.len()];
         let mut in_cycle = 0;
-        let mut order = Vec::with_capacity(members.len());
-        while order.len() < members.len() {
-            let next = free.pop().map(|Reverse(next)| next).unwrap_or_else(|| {
-                while done[in_cycle] {
-                    in_cycle += 1;
+        core::iter::from_fn(move || {
+            let next = loop {
+                let next = match free.pop() {
+                    Some(Reverse(next)) => next,
+                    None => {
+                        in_cycle += done[in_cycle..].iter().position(|done| !done)?;
+                        in_cycle
+                    }
+                };
+                if !core::mem::replace(&mut done[next], true) {
+                    break next;
                 }
-                in_cycle
-            });
-            if core::mem::replace(&mut done[next], true) {
-                continue;
+            };
+            let mut at = self.last[next];
+            while let Some((after, previous)) = self.behind.get(at).copied() {
+                self.before[after] = self.before[after].saturating_sub(1);
+                if self.before[after] == 0 && !done[after] {
+                    free.push(Reverse(after));
+                }
+                at = previous;
             }
-            order.push(members[next].slot);
-            for after in &behind[next] {
-                before[*after] = before[*after].saturating_sub(1);
-                if before[*after] == 0 && !done[*after] {
-                    free.push(Reverse(*after));
+            Some(next)
+        })
+    }
+}
+
+#[cfg(test)]
+#[cfg(not(loom))]
+mod tests {
+    use super::*;
+
+    proptest::proptest! {
+        /// Everybody once; and without cycles, senders before receivers and the first free one first.
+        #[test]
+        fn all_stand_in_order(edges in proptest::collection::vec((0usize..30, 0usize..30), 0..80), may_cycle: bool) {
+            let edges: Vec<_> = edges.into_iter().filter(|(a, b)| if may_cycle { a != b } else { a < b }).collect();
+            // Names need not be in the order of the flow.
+            let named = |i: usize| (i * 7) % 30;
+            let mut flow = Flow::of(30);
+            edges.iter().for_each(|(a, b)| flow.add(named(*a), named(*b)));
+            let order: Vec<usize> = flow.in_order().collect();
+            let mut sorted = order.clone();
+            sorted.sort_unstable();
+            proptest::prop_assert_eq!(sorted, (0..30).collect::<Vec<_>>());
+            let place = |i: usize| order.iter().position(|other| *other == i).unwrap();
+            let waits = |i: usize, at: usize| edges.iter().any(|(a, b)| named(*b) == i && place(named(*a)) >= at);
+            for (at, chosen) in order.iter().enumerate() {
+                let free = (0..30).find(|i| place(*i) >= at && !waits(*i, at));
+                if let Some(free) = free {
+                    proptest::prop_assert_eq!(*chosen, free);
+                } else {
+                    proptest::prop_assert!(may_cycle);
+                    proptest::prop_assert_eq!(Some(*chosen), (0..30).find(|i| place(*i) >= at));
                 }
             }
         }
-        order
     }
 }
