@@ -59,6 +59,7 @@ impl Simulation {
 
     /// Runs to the end. The steps run on a thread of their own, so that one that does not return can be told.
     pub fn run(self) -> Result<Report, CannotRun> {
+        os::gather_heap();
         let running: Vec<Arc<Running>> = self.built.cores.iter().map(|core| core.running.clone()).collect();
         let directory = self.built.directory.clone();
         let (done, ended) = sync_channel(1);
