@@ -2,6 +2,9 @@
 //!
 //! A number is a place and how often the place was given before. A place is given again when its agent is gone and many others have
 //! gone since, so that who was there lately can still be told; the number is another one then, and none is given twice.
+//!
+//! Places whose names fall together stand in a chain, by which a name is found. A place that is given again moves to another chain; who is
+//! on its way through a chain meanwhile may be led astray, sees that by the number of moves, and looks at all places instead.
 
 use std::collections::VecDeque;
 use std::sync::{Mutex, OnceLock, PoisonError};
@@ -19,10 +22,17 @@ const MOST: u32 = 0x7fff;
 /// So many places stay as they were left, for those who ask who it was.
 const REMEMBERED: usize = CHUNK;
 
+/// How many chains there are: with thousands of agents one is as long as it takes to compare a few words.
+const CHAINS: usize = 1 << 10;
+/// The end of a chain.
+const NOBODY: u32 = u32::MAX;
+
 /// One place. The number stands there while the name is whole.
 #[derive(Debug)]
 struct Entry {
     number: AtomicU32,
+    /// The next place of its chain.
+    next: AtomicU32,
     here: AtomicU32,
     name: [AtomicU64; 3],
 }
@@ -38,10 +48,18 @@ struct Free {
     left: VecDeque<u32>,
 }
 
+/// The heads of the chains, and how often places moved: an odd number while one does.
+#[derive(Debug)]
+struct Chains {
+    heads: Box<[AtomicU32]>,
+    moves: AtomicU32,
+}
+
 /// The names of all agents that there are, and of some that were.
 #[derive(Debug)]
 pub(crate) struct Directory {
     chunks: Box<[OnceLock<Chunk>]>,
+    chains: Chains,
     free: Mutex<Free>,
 }
 
@@ -49,6 +67,7 @@ impl Entry {
     fn new() -> Entry {
         Entry {
             number: AtomicU32::new(AgentId::NONE.0),
+            next: AtomicU32::new(NOBODY),
             here: AtomicU32::new(0),
             name: core::array::from_fn(|_| AtomicU64::new(0)),
         }
@@ -64,6 +83,12 @@ impl Entry {
         self.here.store(1, Ordering::Relaxed);
         // Pairs with the acquire in `read`: with the number the whole name is there.
         self.number.store(number, named("names: number", Ordering::Release));
+    }
+
+    /// Whether somebody is here under this name.
+    fn is_named(&self, sought: &[u64; 3]) -> bool {
+        self.here.load(Ordering::Relaxed) == 1
+            && self.name.iter().zip(sought).all(|(word, sought)| word.load(Ordering::Acquire) == *sought)
     }
 
     /// The name, if the place has that number from before reading to after it.
@@ -87,6 +112,88 @@ fn packed(name: &str) -> [u64; 3] {
     })
 }
 
+/// The chain in which a name stands.
+fn chain_of(name: &[u64; 3]) -> usize {
+    // Fibonacci hashing: the upper bits of a product depend on all bits below them.
+    const GOLDEN: u64 = 0x9e37_79b9_7f4a_7c15;
+    let mixed = name.iter().fold(0, |mixed: u64, word| (mixed.rotate_left(29) ^ word).wrapping_mul(GOLDEN));
+    (mixed >> (u64::BITS - CHAINS.trailing_zeros())) as usize
+}
+
+impl Chains {
+    fn new(chains: usize) -> Chains {
+        Chains { heads: (0..chains).map(|_| AtomicU32::new(NOBODY)).collect(), moves: AtomicU32::new(0) }
+    }
+
+    /// Puts a place into a chain, and takes it out of the one where it was. Only one thread at a time does so. `next_of` is the word in a
+    /// place that names the one behind it.
+    fn enter<'a>(
+        &'a self,
+        place: u32,
+        from: Option<usize>,
+        to: usize,
+        next_of: impl Fn(u32) -> Option<&'a AtomicU32>,
+    ) {
+        let Some(own) = next_of(place) else { return };
+        let moves = self.moves.load(Ordering::Relaxed);
+        // Whoever sees a word that is written here sees afterwards that something moves.
+        self.moves.store(moves + 1, Ordering::Relaxed);
+        if let Some(from) = from {
+            let mut before = &self.heads[from];
+            loop {
+                let next = before.load(Ordering::Relaxed);
+                if next == place {
+                    // Pairs with the acquire in `walk`.
+                    before.store(own.load(Ordering::Relaxed), Ordering::Release);
+                    break;
+                }
+                let Some(behind) = next_of(next) else { break };
+                before = behind;
+            }
+        }
+        // Pairs with the acquire in `walk`.
+        own.store(self.heads[to].load(Ordering::Relaxed), named("names: move", Ordering::Release));
+        // Pairs with the acquire in `walk`: who finds the place finds what is in it and behind it.
+        self.heads[to].store(place, named("names: enter", Ordering::Release));
+        // Pairs with the acquire at the beginning of `walk`: all of it is done.
+        self.moves.store(moves + 2, named("names: moved", Ordering::Release));
+    }
+
+    /// Goes through a chain until `is_it`. Nothing is sure when a place moved meanwhile, or when it goes on for ever.
+    fn walk<'a>(
+        &'a self,
+        chain: usize,
+        next_of: impl Fn(u32) -> Option<&'a AtomicU32>,
+        is_it: impl Fn(u32) -> bool,
+    ) -> Walked {
+        let moves = self.moves.load(Ordering::Acquire);
+        let mut place = self.heads[chain].load(Ordering::Acquire);
+        for _ in 0..=CHUNK * CHUNKS {
+            let Some(next) = next_of(place) else {
+                // What was seen of a move was seen before this.
+                let undisturbed = moves.is_multiple_of(2) && self.moves.load(Ordering::Relaxed) == moves;
+                return if undisturbed { Walked::Nobody } else { Walked::Unsure };
+            };
+            if is_it(place) {
+                return Walked::Found(place);
+            }
+            place = next.load(Ordering::Acquire);
+        }
+        Walked::Unsure
+    }
+}
+
+/// What became of a walk through a chain.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Walked {
+    /// It is at this place.
+    Found(u32),
+    /// It is at no place of the chain.
+    Nobody,
+    /// Somebody moved meanwhile.
+    Unsure,
+}
+
 fn unpacked(words: [u64; 3]) -> Name {
     let mut bytes = [0; 24];
     for (place, word) in bytes.chunks_exact_mut(8).zip(words) {
@@ -99,7 +206,11 @@ fn unpacked(words: [u64; 3]) -> Name {
 
 impl Directory {
     pub(crate) fn new() -> Directory {
-        Directory { chunks: (0..CHUNKS).map(|_| OnceLock::new()).collect(), free: Mutex::default() }
+        Directory {
+            chunks: (0..CHUNKS).map(|_| OnceLock::new()).collect(),
+            chains: Chains::new(CHAINS),
+            free: Mutex::default(),
+        }
     }
 
     fn entry(&self, number: u32) -> Option<&Entry> {
@@ -107,19 +218,31 @@ impl Directory {
         self.chunks.get(place / CHUNK)?.get()?.get(place % CHUNK)
     }
 
+    /// The word that names the place behind another one in its chain.
+    fn next_of(&self, place: u32) -> Option<&AtomicU32> {
+        if place == NOBODY { None } else { self.entry(place).map(|entry| &entry.next) }
+    }
+
     /// A number for a new agent, which nobody had before. Nothing when there are more agents than places.
     pub(crate) fn give(&self, name: &str) -> Option<AgentId> {
         let mut free = self.free.lock().unwrap_or_else(PoisonError::into_inner);
         let full = free.used as usize >= CHUNK * CHUNKS;
-        let number = if free.left.len() > REMEMBERED || full {
+        let is_given_again = free.left.len() > REMEMBERED || full;
+        let number = if is_given_again {
             free.left.pop_front()? + (1 << PLACE)
         } else {
             free.used += 1;
             free.used - 1
         };
-        let place = number as usize & ((1 << PLACE) - 1);
-        self.chunks[place / CHUNK].get_or_init(|| (0..CHUNK).map(|_| Entry::new()).collect());
-        self.entry(number)?.write(number, name);
+        let place = number & ((1 << PLACE) - 1);
+        self.chunks[place as usize / CHUNK].get_or_init(|| (0..CHUNK).map(|_| Entry::new()).collect());
+        let entry = self.entry(number)?;
+        let before = entry.name.each_ref().map(|word| word.load(Ordering::Relaxed));
+        let (from, to) = (is_given_again.then(|| chain_of(&before)), chain_of(&packed(name)));
+        entry.write(number, name);
+        if from != Some(to) {
+            self.chains.enter(place, from, to, |place| self.next_of(place));
+        }
         Some(AgentId(number))
     }
 
@@ -146,18 +269,19 @@ impl Directory {
             // No name is that long.
             return None;
         }
-        let entries = self.chunks.iter().map_while(OnceLock::get).flat_map(|chunk| chunk.iter());
-        entries
-            .filter(|entry| {
-                entry.here.load(Ordering::Relaxed) == 1
-                    && entry
-                        .name
-                        .iter()
-                        .zip(sought)
-                        .all(|(word, sought)| word.load(Ordering::Acquire) == sought)
-            })
-            .map(|entry| AgentId(entry.number.load(Ordering::Relaxed)))
-            .find(|id| *id != AgentId::NONE)
+        let is_it = |place| self.entry(place).is_some_and(|entry| entry.is_named(&sought));
+        let found = match self.chains.walk(chain_of(&sought), |place| self.next_of(place), is_it) {
+            Walked::Found(place) => self.entry(place),
+            Walked::Nobody => None,
+            Walked::Unsure => self.entries().find(|entry| entry.is_named(&sought)),
+        };
+        let id = AgentId(found?.number.load(Ordering::Relaxed));
+        (id != AgentId::NONE).then_some(id)
+    }
+
+    /// All places that were ever given.
+    fn entries(&self) -> impl Iterator<Item = &Entry> {
+        self.chunks.iter().map_while(OnceLock::get).flat_map(|chunk| chunk.iter())
     }
 }
 
@@ -174,6 +298,38 @@ mod tests {
             assert_eq!(directory.find(name), Some(id));
         }
         assert_eq!(directory.find("a.name.of.23.charactersX"), None);
+    }
+
+    /// Chains of many, and names that come back at other places.
+    #[test]
+    fn thousands_are_found_by_name_whoever_came_and_went() {
+        let directory = Directory::new();
+        let mut here = std::collections::HashMap::new();
+        let mut draw = 1u64;
+        for _ in 0..40_000 {
+            // Knuth's linear congruential generator.
+            draw = draw.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+            let name = format!("agent{}", draw >> 33 & 0xfff);
+            match here.remove(&name) {
+                Some(id) => directory.take_back(id),
+                None => drop(here.insert(name.clone(), directory.give(&name).unwrap())),
+            }
+        }
+        assert!(here.len() > 1500);
+        for n in 0..0x1000 {
+            let name = format!("agent{n}");
+            assert_eq!(directory.find(&name), here.get(&name).copied(), "{name}");
+        }
+        // Each place stands in one chain.
+        let mut seen = std::collections::HashSet::new();
+        for head in &directory.chains.heads {
+            let mut place = head.load(Ordering::Relaxed);
+            while let Some(next) = directory.next_of(place) {
+                assert!(seen.insert(place), "{place} twice");
+                place = next.load(Ordering::Relaxed);
+            }
+        }
+        assert_eq!(seen.len(), directory.free.lock().unwrap().used as usize);
     }
 
     #[test]
@@ -205,6 +361,30 @@ mod model {
     use super::*;
     use crate::sync::weaken;
     use loom::{sync::Arc, thread};
+
+    /// Whoever stays in a chain is found, while a place moves from before one to before another.
+    #[test]
+    fn who_stays_is_found_or_the_walk_is_unsure() {
+        weaken::check(&["names: word", "names: number"], || {
+            let chains = Arc::new(Chains::new(2));
+            let next: Arc<[AtomicU32; 3]> = Arc::new(core::array::from_fn(|_| AtomicU32::new(NOBODY)));
+            // The chain 0 is 1, 0; the chain 1 is 2.
+            for (place, chain) in [(0, 0), (1, 0), (2, 1)] {
+                chains.enter(place, None, chain, |place| next.get(place as usize));
+            }
+            let (theirs, places) = (chains.clone(), next.clone());
+            let mover =
+                thread::spawn(move || theirs.enter(1, Some(0), 1, |place| places.get(place as usize)));
+            let walk =
+                |chain, sought| chains.walk(chain, |place| next.get(place as usize), |place| place == sought);
+            for stays in [(0, 0), (1, 2)] {
+                assert_ne!(walk(stays.0, stays.1), Walked::Nobody, "who stays is not there");
+            }
+            mover.join().unwrap();
+            assert_eq!([walk(0, 0), walk(0, 1)], [Walked::Found(0), Walked::Nobody]);
+            assert_eq!([walk(1, 1), walk(1, 2)], [Walked::Found(1), Walked::Found(2)]);
+        });
+    }
 
     /// While a place is given to another, whoever asks for the old number gets the old name or none.
     #[test]
