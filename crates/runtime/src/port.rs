@@ -137,6 +137,8 @@ pub struct PortVisit<'a> {
 /// Where a wire leads.
 #[derive(Clone)]
 pub(crate) struct Target {
+    /// Who receives; nobody where that is found out for each message, or is nobody in the system.
+    pub agent: AgentId,
     pub executor: u32,
     pub slot: u32,
     pub door: Arc<Door>,

@@ -436,8 +436,8 @@ mod model {
     use crate::ring::Overload;
     use crate::sync::weaken;
     use loom::thread;
-    use types::Filter;
     use types::messages::Twist;
+    use types::{AgentId, Filter};
 
     fn output(options: &PortOptions) -> (Output<Twist>, PortEnds) {
         let mut output = Output::default();
@@ -447,7 +447,8 @@ mod model {
     }
 
     fn wire(id: u32, from: &PortEnds, to: &PortEnds, priorities: &[Priority]) {
-        let target = Target { executor: 0, slot: 0, door: Arc::new(Door::new()), wakes: false };
+        let target =
+            Target { agent: AgentId::NONE, executor: 0, slot: 0, door: Arc::new(Door::new()), wakes: false };
         let (overload, counts) = (Overload::Refuse, Arc::default());
         let spec = WireSpec { id: WireId(id), depth: 1, overload, filter: Filter::default(), target, counts };
         let (from, to) = (from.output.as_ref().unwrap(), to.input.as_ref().unwrap());

@@ -2,6 +2,8 @@
 
 #![allow(unsafe_code)]
 
+mod chosen;
+
 use core::sync::atomic::{AtomicU64, Ordering};
 use std::any::Any;
 use std::cell::UnsafeCell;

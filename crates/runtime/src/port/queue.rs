@@ -6,7 +6,7 @@ use std::any::Any;
 use std::sync::Arc;
 
 use types::message::is_large;
-use types::{Filter, Header, Message, Priority};
+use types::{AgentId, Filter, Header, Message, Priority};
 
 use super::input::{InputInner, Lane, NewLanes, Source};
 use super::output::NewRoute;
@@ -98,7 +98,8 @@ impl<T: Message> QueueEnd for QueueCore<T> {
         let sender = self.shared.sender(priorities)?;
         let rings = sender.rings();
         // Whom a message wakes is found out for each one.
-        let target = Target { executor: 0, slot: 0, door: self.form.doors.first()?.clone(), wakes: false };
+        let door = self.form.doors.first()?.clone();
+        let target = Target { agent: AgentId::NONE, executor: 0, slot: 0, door, wakes: false };
         let way = Way::Queue(Box::new(sender));
         let route =
             Route::<T>::new(wire.id, wire.filter, self.form.overload, target, wire.counts.clone(), way);

@@ -24,8 +24,10 @@ pub(super) struct Route<T: Message> {
     pub(super) target: Target,
     pub(super) counts: Arc<WireCounts>,
     pub(super) overload: Overload,
-    /// Whether its filter lets all through.
+    /// Whether its filter lets all through, and it is open.
     takes_all: bool,
+    /// Whether it is closed for a message that is for another who was chosen.
+    closed: bool,
     pub(super) wire: WireId,
     filter: Filter,
     passed: u32,
@@ -51,8 +53,16 @@ impl<T: Message> Route<T> {
         counts: Arc<WireCounts>,
         way: Way<T>,
     ) -> Route<T> {
-        let takes_all = filter.every <= 1 && Filter { every: 0, ..filter } == Filter::ALL;
-        Route { target, counts, overload, takes_all, wire, filter, passed: 0, way }
+        let mut route =
+            Route { target, counts, overload, takes_all: false, closed: false, wire, filter, passed: 0, way };
+        route.close(false);
+        route
+    }
+
+    /// Closes it for what is sent now, or opens it again.
+    pub(super) fn close(&mut self, closed: bool) {
+        let all = self.filter.every <= 1 && Filter { every: 0, ..self.filter } == Filter::ALL;
+        (self.closed, self.takes_all) = (closed, all && !closed);
     }
 
     /// Whether it takes all messages as they are, with one priority.
@@ -70,7 +80,7 @@ impl<T: Message> Route<T> {
     }
 
     fn filter_passes(&mut self, header: &Header) -> bool {
-        if !self.filter.passes(header) {
+        if self.closed || !self.filter.passes(header) {
             return false;
         }
         if self.filter.every > 1 {

@@ -173,7 +173,7 @@ impl Router {
     /// A wire for one message to or from the agent in a slot.
     fn spec(&mut self, executor: usize, slot: u32, wakes: bool, filter: Filter) -> WireSpec {
         let door = self.executors[executor].link.door.clone();
-        let target = Target { executor: executor as u32, slot, door, wakes };
+        let target = Target { agent: AgentId::NONE, executor: executor as u32, slot, door, wakes };
         let counts = Arc::new(WireCounts::default());
         WireSpec { id: self.wire_id(), depth: 1, overload: Overload::Refuse, filter, target, counts }
     }

@@ -147,6 +147,7 @@ impl Router {
             return Err(Refusal::new(format!("{from} cannot be wired to {to}")));
         };
         let target = Target {
+            agent: receiver.id,
             executor: receiver.executor as u32,
             slot: receiver.slot,
             door: self.executors[receiver.executor].link.door.clone(),
