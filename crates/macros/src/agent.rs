@@ -7,11 +7,17 @@ use crate::names::{doc, ident, kebab, named_fields, path_to};
 
 const PORTS: [&str; 4] = ["Input", "Output", "Service", "Client"];
 
+/// The end at the router, of which an agent has one at most. No wire leads to it, so it has no handle in a plan.
+const ROUTER: &str = "Router";
+
 /// `Input` and `[T]` of `Input<T>`; nothing for other types.
 fn port_type(ty: &Type) -> Option<(String, Vec<&Type>)> {
     let Type::Path(path) = ty else { return None };
     let last = path.path.segments.last()?;
     let name = last.ident.to_string();
+    if name == ROUTER && last.arguments.is_none() {
+        return Some((name, Vec::new()));
+    }
     if !PORTS.contains(&name.as_str()) {
         return None;
     }
@@ -45,6 +51,17 @@ fn options(field: &Field, runtime: &proc_macro2::TokenStream) -> syn::Result<pro
     Ok(quote!(#runtime::PortOptions { #(#sets,)* ..#runtime::PortOptions::DEFAULT }))
 }
 
+/// One is enough, and it has nothing to be chosen.
+fn check_router(field: &Field, has_router: &mut bool) -> syn::Result<()> {
+    if core::mem::replace(has_router, true) {
+        return Err(syn::Error::new_spanned(field, "an agent has one `Router`"));
+    }
+    match field.attrs.iter().find(|a| a.path().is_ident("port") || a.path().is_ident("robot")) {
+        Some(attribute) => Err(syn::Error::new_spanned(attribute, "a `Router` has no options")),
+        None => Ok(()),
+    }
+}
+
 pub(crate) fn derive(input: DeriveInput) -> syn::Result<proc_macro2::TokenStream> {
     let runtime = path_to("runtime");
     let name = &input.ident;
@@ -63,6 +80,7 @@ pub(crate) fn derive(input: DeriveInput) -> syn::Result<proc_macro2::TokenStream
 
     let (mut builds, mut visits, mut handle_fields, mut handle_makes) = (vec![], vec![], vec![], vec![]);
     let mut params_type = None;
+    let mut has_router = false;
     for field in named_fields(&input)? {
         let id = ident(field)?;
         let key = id.to_string();
@@ -74,10 +92,17 @@ pub(crate) fn derive(input: DeriveInput) -> syn::Result<proc_macro2::TokenStream
         builds.push(quote!(#id: ::core::default::Default::default()));
         let Some((port, types)) = port_type(&field.ty) else { continue };
         let about = doc(&field.attrs);
+        let is_router = port == ROUTER;
+        if is_router {
+            check_router(field, &mut has_router)?;
+        }
         let options = options(field, &runtime)?;
         visits.push(quote! {
             visit(#runtime::PortVisit { name: #key, doc: #about, options: #options, port: &mut self.#id });
         });
+        if is_router {
+            continue;
+        }
         let end = format_ident!("{port}End");
         handle_fields.push(quote! {
             #[doc = #about]

@@ -13,6 +13,7 @@ use proc_macro::TokenStream;
 /// Writes `runtime::Declare` for a struct of ports, a field `params` and state that has a default.
 ///
 /// * A field of type `Input<T>`, `Output<T>`, `Service<Q, A>` or `Client<Q, A>` is a port named like the field.
+/// * A field of type `Router` is the agent's end at the router; one is enough, and no wire leads to it.
 /// * `#[robot("drive")]` on a port wires it to that port of the robot which the system file names for the agent.
 /// * `#[port(history = 16)]` on an output keeps its last messages in memory; `#[port(rows = 4096)]` is the greatest length of
 ///   the row of a large message; `#[port(priorities = "urgent, normal")]` names the priorities that it uses.

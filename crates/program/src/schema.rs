@@ -1,6 +1,6 @@
 //! The JSON schema of system files, for editors: the agent types of this program with their parameters, docs and ranges.
 
-use runtime::{AgentType, ExecutorPlan, Overload, PortInfo, Registry};
+use runtime::{AgentType, Direction, ExecutorPlan, Overload, PortInfo, Registry};
 use serde_json::{Map, Value as Json, json};
 use types::params::ParamField;
 use types::value::{Table, Value};
@@ -101,7 +101,7 @@ fn one_or_more(item: &Json) -> Json {
 
 /// `[agent.NAME]` with an agent of this type.
 fn agent(kind: &AgentType) -> Json {
-    let takes = |port: &&PortInfo| port.shape.input.is_some();
+    let takes = |port: &&PortInfo| port.shape.comes_in();
     let inputs: Vec<Json> = kind
         .ports
         .iter()
@@ -139,7 +139,8 @@ fn agent(kind: &AgentType) -> Json {
 
 fn ports(kind: &AgentType) -> String {
     let list = |takes: bool| {
-        let ports = kind.ports.iter().filter(|port| port.shape.input.is_some() == takes);
+        let messages = kind.ports.iter().filter(|port| port.shape.direction != Direction::Router);
+        let ports = messages.filter(|port| port.shape.input.is_some() == takes);
         ports.map(|port| port.name).collect::<Vec<_>>().join(", ")
     };
     format!("Takes: {}. Gives: {}.", list(true), list(false))

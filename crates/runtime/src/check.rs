@@ -95,9 +95,8 @@ impl<'a> Checker<'a> {
             };
             self.mistakes.extend(kind.check_params(&agent.params));
             for input in &agent.on {
-                if kind.port(input).is_none_or(|port| port.shape.input.is_none()) {
-                    let known =
-                        kind.ports.iter().filter(|port| port.shape.input.is_some()).map(|port| port.name);
+                if kind.port(input).is_none_or(|port| !port.shape.comes_in()) {
+                    let known = kind.ports.iter().filter(|port| port.shape.comes_in()).map(|port| port.name);
                     self.mistakes.push(Mistake::unknown(
                         agent.at,
                         &format!("input of {}", agent.kind),

@@ -70,6 +70,7 @@ extern crate self as runtime;
 mod agent;
 mod allocations;
 mod check;
+mod composition;
 mod context;
 mod door;
 mod executor;
@@ -104,6 +105,7 @@ pub use agent::{
 };
 pub use allocations::Watched;
 pub use check::{check, executors_of, wires_of};
+pub use composition::{Composition, End, Left, Member, PortAt, PortSeen, QueueSeen, WireSeen};
 pub use executor::{Cause, StepFault};
 pub use folder::{FolderError, RunFolder};
 pub use log::{LogChoice, Recorder, write_note};
@@ -114,8 +116,9 @@ pub use plan::{
     WirePlan, owner, value_of,
 };
 pub use port::{
-    Direction, Envelope, Input, Output, OutputFault, Port, PortEnds, PortOptions, PortShape, PortVisit,
-    Received, Sent, WireCounts, WireId,
+    Decision, Direction, Envelope, Gives, Input, Look, NotAsked, Output, OutputFault, OwnAddress, OwnPort,
+    Place, Port, PortEnds, PortOptions, PortShape, PortVisit, REQUESTS_UNDER_WAY, Received, Router, Sent,
+    Takes, Why, WireCounts, WireId, Wiring,
 };
 pub use queue_plan::{MOST_SERVING, PlanParts, Queue, QueuePlan};
 pub use request::{

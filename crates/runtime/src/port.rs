@@ -8,6 +8,7 @@ mod input;
 mod output;
 mod queue;
 mod route;
+mod router;
 
 use core::sync::atomic::{AtomicU64, Ordering};
 use std::any::Any;
@@ -80,6 +81,8 @@ pub enum Direction {
     Service,
     /// Calls go out and answers come in.
     Client,
+    /// Requests to the router go out and what it decided comes in.
+    Router,
 }
 
 impl Direction {
@@ -90,6 +93,7 @@ impl Direction {
             Direction::Output => "output",
             Direction::Service => "service",
             Direction::Client => "client",
+            Direction::Router => "router",
         }
     }
 }
@@ -103,6 +107,13 @@ pub struct PortShape {
     pub input: Option<&'static MessageType>,
     /// What goes out.
     pub output: Option<&'static MessageType>,
+}
+
+impl PortShape {
+    /// Whether something comes in that can make an agent run.
+    pub fn comes_in(&self) -> bool {
+        self.input.is_some() || self.direction == Direction::Router
+    }
 }
 
 /// What stands behind a port: the parts that belong to the router.
@@ -278,3 +289,8 @@ pub use output::{Envelope, Output};
 pub(crate) use output::{OutputCore, downcast_output, output_core};
 pub(crate) use queue::{QueueEnd, QueueForm, QueueWire, Rest, Teller};
 pub use route::Sent;
+pub(crate) use router::{Acquaintance, Ask, Deed, RouterEnd, Told, router_end};
+pub use router::{
+    Decision, Gives, Look, NotAsked, OwnAddress, OwnPort, Place, REQUESTS_UNDER_WAY, Router, Takes, Why,
+    Wiring,
+};

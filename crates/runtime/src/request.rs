@@ -311,6 +311,8 @@ pub struct PortView {
     pub message: &'static str,
     /// Messages sent out of it.
     pub sent: u64,
+    /// Where it leads to the router: requests that were asked, and those that were not because too many were under way.
+    pub asked: Option<(u64, u64)>,
 }
 
 /// What a running system says of a wire.

@@ -9,6 +9,7 @@
 //! not drained yet is asked again.
 
 mod agents;
+mod asking;
 mod calls;
 mod deaths;
 mod order;
@@ -39,6 +40,7 @@ use crate::ring::Overload;
 use crate::stats::AgentStats;
 use crate::tap::Tap;
 
+pub(crate) use asking::Said;
 pub(crate) use calls::OutsideCall;
 pub use calls::ServiceShape;
 pub(crate) use staged::Staged;
@@ -121,10 +123,16 @@ impl Known {
         *out = out.saturating_add_signed(by);
     }
 
-    /// Whether a message for this port makes it run. Answers do, wherever they come from.
+    /// Whether a message for this port makes it run. Answers and decisions do, wherever they come from.
     fn wakes(&self, port: usize) -> bool {
-        let port = &self.kind.ports[port];
-        port.shape.direction == Direction::Client || self.plan.on.iter().any(|on| on == port.name)
+        let direction = self.kind.ports[port].shape.direction;
+        matches!(direction, Direction::Client | Direction::Router) || self.is_on(port)
+    }
+
+    /// Whether its plan says that it runs for this port.
+    fn is_on(&self, port: usize) -> bool {
+        let name = self.kind.ports[port].name;
+        self.plan.on.iter().any(|on| on == name)
     }
 }
 
@@ -185,6 +193,7 @@ pub(crate) struct Router {
     names: HashMap<String, AgentId>,
     wires: BTreeMap<WireId, Wire>,
     queues: Vec<queues::Queue>,
+    asking: asking::Asking,
     pub executors: Vec<ExecutorKnown>,
     added: u64,
     next_wire: u32,
@@ -227,6 +236,7 @@ impl Router {
             names: HashMap::new(),
             wires: BTreeMap::new(),
             queues: Vec::new(),
+            asking: asking::Asking::default(),
             executors,
             added: 0,
             next_wire: 0,

@@ -82,9 +82,9 @@ impl Call {
     }
 }
 
-/// The number of a call that is under way.
+/// The number of a call, or of a request to the router, that is under way.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Ticket(u32);
+pub struct Ticket(pub(crate) u32);
 
 /// What became of a call.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -159,6 +159,18 @@ impl<Q: Message<Element = NoElement>, A: Message<Element = NoElement>> Client<Q,
             context.wake_at(next);
         }
         None
+    }
+}
+
+impl<Q: Message, A: Message> Service<Q, A> {
+    pub(crate) fn core_address(&self) -> Option<usize> {
+        self.calls.core_address()
+    }
+}
+
+impl<Q: Message, A: Message> Client<Q, A> {
+    pub(crate) fn core_address(&self) -> Option<usize> {
+        self.calls.core_address()
     }
 }
 

@@ -19,7 +19,7 @@ use crate::os;
 use crate::plan::Plan;
 use crate::processor::Moment;
 use crate::request::{Refusal, Request};
-use crate::router::{Incident, OutsideCall, Router};
+use crate::router::{Incident, OutsideCall, Router, Said};
 use crate::system::{Ask, Built, CannotRun, Control, Options, Report, Still, Verdict, asks, build};
 use crate::trace;
 
@@ -27,6 +27,8 @@ use crate::trace;
 const HOST_LIMIT: Duration = Duration::secs(10);
 /// So many steps at one instant for each agent are taken for an endless loop.
 const STEPS_AT_ONCE: u64 = 10_000;
+/// What agents ask of the router is decided once at an instant; what they ask after that, so much later at most.
+const DECIDES_AGAIN: Duration = Duration::millis(1);
 
 /// A system in simulated time, ready to run.
 pub struct Simulation {
@@ -112,6 +114,8 @@ struct Player {
     /// Agents that hang: when they are given up, their executor and slot.
     hung: Vec<(Time, usize, u32)>,
     incidents_seen: usize,
+    /// When requests of agents were decided last.
+    decided: Time,
 }
 
 fn play(simulation: Simulation) -> Result<Report, CannotRun> {
@@ -136,6 +140,7 @@ fn play(simulation: Simulation) -> Result<Report, CannotRun> {
         blocked,
         hung: Vec::new(),
         incidents_seen: 0,
+        decided: Time(i64::MIN),
     };
 
     let entered = player.context.enter();
@@ -161,8 +166,10 @@ fn play(simulation: Simulation) -> Result<Report, CannotRun> {
         }
         player.instant()?;
         let next_supervision = player.supervise();
-        // Who was started again may have messages to take at this very instant.
+        player.decide_asked();
+        // Who was started again may have messages to take at this very instant, or something was decided for somebody.
         player.instant()?;
+        let next_decision = player.next_decision();
         let next_call = player.answer_calls();
         if player.now >= next_look {
             next_look = player.now + observer.every().max(Duration::millis(1));
@@ -171,8 +178,14 @@ fn play(simulation: Simulation) -> Result<Report, CannotRun> {
             }
         }
         let next_timed = timed.peek().map_or(Time::NEVER, |(at, _, _)| *at);
-        let next =
-            player.next_event().min(next_timed).min(next_look).min(next_supervision).min(next_call).min(end);
+        let next = player
+            .next_event()
+            .min(next_timed)
+            .min(next_look)
+            .min(next_supervision)
+            .min(next_call)
+            .min(next_decision)
+            .min(end);
         if player.now >= end {
             break "the time is over".into();
         }
@@ -316,6 +329,23 @@ impl Player {
         }
         self.incidents_seen = self.router.incidents.len();
         next
+    }
+
+    /// Decides what agents have asked of the router, once at each instant, so that a run goes on whatever they ask.
+    fn decide_asked(&mut self) {
+        if !self.router.is_asked() || self.decided == self.now {
+            return;
+        }
+        self.decided = self.now;
+        let mut fabric = Still { cores: &mut self.cores, context: &self.context, now: self.now };
+        for Said { agent, what } in self.router.decide_asked(self.now, &mut fabric) {
+            self.context.log(|log| log.line(self.now, &agent, &what));
+        }
+    }
+
+    /// When what was asked since then is decided.
+    fn next_decision(&self) -> Time {
+        if self.router.is_asked() { self.now + DECIDES_AGAIN } else { Time::NEVER }
     }
 
     /// Answers what was asked from outside. Says why the run ends, if it does.

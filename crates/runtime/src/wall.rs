@@ -30,7 +30,7 @@ use crate::os;
 use crate::plan::{ExecutorPlan, Plan};
 use crate::processor::{Processors, Stopwatch};
 use crate::request::{Refusal, Request};
-use crate::router::{Incident, OutsideCall, Router};
+use crate::router::{Incident, OutsideCall, Router, Said};
 use crate::sync::Futex;
 use crate::system::{Ask, Built, CannotRun, Control, Options, Report, Verdict, asks, build};
 use crate::trace;
@@ -357,6 +357,9 @@ impl Runner {
         let mut fabric = Threads::new(&self.cells);
         self.router.supervise(now, &mut fabric);
         self.router.answer_calls(now, &mut fabric);
+        for Said { agent, what } in self.router.decide_asked(now, &mut Threads::new(&self.cells)) {
+            self.router.log_shared.note(now, &agent, &what);
+        }
         for incident in &self.router.incidents[self.incidents_seen..] {
             self.router.log_shared.note(incident.time, &incident.agent, &incident.what);
         }

@@ -38,8 +38,8 @@ pub use types;
 /// What nearly every agent names.
 pub mod prelude {
     pub use runtime::{
-        Agent, Client, Fault, Input, Options, Output, Params, Plan, Registry, Reply, Service, Simulation,
-        Step, note, registry,
+        Agent, Client, Decision, Fault, Input, Options, Output, Params, Plan, Registry, Reply, Router,
+        Service, Simulation, Step, note, registry,
     };
     pub use types::{Duration, Message, Point, Pose, Time};
 }

@@ -157,9 +157,9 @@ fn timing(r: &mut TableReader<'_>, agent: &mut AgentPlan) {
 
 fn inputs(r: &mut TableReader<'_>, agent: &mut AgentPlan, kind: Option<&AgentType>) {
     for (input, at) in r.texts("on").unwrap_or_default() {
-        let takes = |kind: &AgentType| kind.port(input).is_some_and(|port| port.shape.input.is_some());
+        let takes = |kind: &AgentType| kind.port(input).is_some_and(|port| port.shape.comes_in());
         if let Some(kind) = kind.filter(|kind| !takes(kind)) {
-            let known = kind.ports.iter().filter(|port| port.shape.input.is_some()).map(|port| port.name);
+            let known = kind.ports.iter().filter(|port| port.shape.comes_in()).map(|port| port.name);
             let what = format!("an agent of type \"{}\" has no input \"{input}\"", kind.kind);
             r.report(unknown(at, what, input, known));
         }

@@ -369,6 +369,10 @@ mod tests {
         assert_eq!(format!("{:?}", words::parse(&words).unwrap()), format!("{request:?}"));
         assert_eq!(asked.told(OUTSIDE, "the run begins"), None);
         assert_eq!(asked.told("wall", "asked: for more"), None, "an agent may say what it likes");
+        for who in [OUTSIDE, PLAN] {
+            // Whatever an agent is called: in a repeated run it asks again by itself.
+            assert_eq!(asked.told(who, "asked the router: wire a.b c.d"), None);
+        }
         assert_eq!(understood("Call { service: \"a.b\" }"), None);
     }
 

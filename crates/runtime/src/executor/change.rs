@@ -17,7 +17,7 @@ use crate::context::Context;
 use crate::door::Door;
 use crate::handover::Running;
 use crate::os;
-use crate::port::{Envelope, InputEnd, OutputEnd, Rest, WireId};
+use crate::port::{Envelope, InputEnd, OutputEnd, Rest, RouterEnd, Told, WireId};
 use crate::ring;
 use crate::stats::{bump, bump_by};
 use crate::sync::{Ordering, light_barrier};
@@ -98,6 +98,12 @@ pub(crate) enum Change {
         envelope: Envelope,
         slot: u32,
     },
+    /// Tells an agent what the system is made of, and what was decided for it.
+    Tell {
+        end: Arc<RouterEnd>,
+        told: Box<Told>,
+        slot: u32,
+    },
     /// Changes nothing: who asks knows that the executor answers.
     Nothing,
     /// Ends all agents.
@@ -122,7 +128,8 @@ impl Change {
             | Change::Timing { slot, .. }
             | Change::Fault { slot, .. }
             | Change::OutputFault { slot, .. }
-            | Change::Send { slot, .. } => Some(*slot),
+            | Change::Send { slot, .. }
+            | Change::Tell { slot, .. } => Some(*slot),
             // A seat is exchanged or taken away whole, and what is lost has left it.
             Change::Seat { .. }
             | Change::Unseat { .. }
@@ -331,6 +338,10 @@ impl Core {
                 end.send_prepared(envelope, message.as_ref());
                 context.end();
                 self.mark_woken(context);
+            }
+            Change::Tell { end, told, slot } => {
+                end.tell(told);
+                self.find_whether_ready(*slot);
             }
             // With agents that have a word in it: not here.
             Change::Nothing | Change::Unseat { .. } | Change::Body { .. } | Change::Stop => {}

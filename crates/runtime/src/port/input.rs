@@ -290,6 +290,11 @@ impl<T: Message> Input<T> {
         self.core = core;
     }
 
+    /// Where its mailbox lies: a number to know it by.
+    pub(crate) fn core_address(&self) -> Option<usize> {
+        self.core.as_ref().map(|core| Arc::as_ptr(core).addr())
+    }
+
     /// Whether any wire leads here.
     pub fn is_wired(&self) -> bool {
         self.core.as_ref().is_some_and(|core| !core.inner().lanes.is_empty())

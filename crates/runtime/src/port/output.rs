@@ -327,6 +327,11 @@ impl<T: Message> Output<T> {
         self.core = core;
     }
 
+    /// Where its routes lie: a number to know it by.
+    pub(crate) fn core_address(&self) -> Option<usize> {
+        self.core.as_ref().map(|core| Arc::as_ptr(core).addr())
+    }
+
     /// The greatest length of the row of a message.
     pub fn row_capacity(&self) -> usize {
         self.core.as_ref().map_or(0, |core| core.rows)

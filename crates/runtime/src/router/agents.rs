@@ -86,6 +86,7 @@ impl Router {
         });
         self.names.insert(known.plan.name.clone(), id);
         self.agents.insert(id, known);
+        staged.when_decided(move |router| router.acquaint(id));
         Ok(id)
     }
 
@@ -188,6 +189,7 @@ impl Router {
         staged.reorder(executor);
         staged.when_decided(move |router| {
             router.end_calls_of(id, "was removed before it answered");
+            router.dismiss(id);
             router.directory.take_back(id);
         });
         staged.undo(move |router| {

@@ -33,6 +33,7 @@ impl Router {
             next = next.min(self.ask_again());
             self.advance(fabric);
         }
+        self.publish(fabric);
         next
     }
 
@@ -48,6 +49,7 @@ impl Router {
                 next = next.min(at);
             } else if let Err(refusal) = self.start_again(id) {
                 self.of_mut(id, |known| known.state = AgentState::Dead);
+                self.asking.changes();
                 self.say_of(id, format!("left dead, for it cannot be built: {refusal}"));
             }
         }
@@ -85,6 +87,7 @@ impl Router {
                 Cause::Panic(record.to_text())
             }
         };
+        self.asking.changes();
         if self.by_id(id).is_some_and(|known| known.slot == slot) {
             self.bury(id, time, &cause);
             if lost {
@@ -177,6 +180,7 @@ impl Router {
     fn lose(&mut self, wire: &Wire, refusal: Refusal) {
         let plan = self.plan_of(wire);
         self.say_of(wire.from.0, format!("the wire from {} to {} is lost: {refusal}", plan.from, plan.to));
+        self.asking.changes();
         let lost = self.unlist(wire.id).and_then(|wire| wire.partner);
         if let Some(partner) = lost {
             self.unlist(partner);
@@ -208,6 +212,7 @@ impl Router {
         known.rings.fill(Rings::default());
         let (name, kind, ends) = (known.plan.name.clone(), known.kind.clone(), known.ends.clone());
         self.number_outputs(&name, &kind, &ends);
+        self.acquaint(id);
         Ok(())
     }
 }

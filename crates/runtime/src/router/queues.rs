@@ -10,8 +10,10 @@ use std::sync::Arc;
 
 use types::{AgentId, Filter, Priority};
 
+use super::asking::row_of_queue;
 use super::script::{Step, What};
 use super::{PortId, Reply, Router, Staged};
+use crate::composition::WireRow;
 use crate::door::bit_of;
 use crate::executor::Change;
 use crate::message_type::MessageType;
@@ -122,6 +124,9 @@ impl Queue {
     }
 }
 
+/// The names of queues with what they hold, and wires.
+type PartsOfQueues<'a> = (Vec<(&'a str, Option<&'static MessageType>)>, Vec<WireRow>);
+
 /// A wire to or from a queue: the place of the queue, the side, the place of the wire on that side.
 type Found = (usize, QueueSide, usize);
 
@@ -133,6 +138,19 @@ impl Router {
     /// Whether this is the name of a queue.
     pub(super) fn is_queue(&self, name: &str) -> bool {
         self.queue_at(name).is_some()
+    }
+
+    /// All queues with what they hold, and the wires to and from them.
+    pub(super) fn parts_of_queues(&self) -> PartsOfQueues<'_> {
+        let queues = self.queues.iter().map(|queue| {
+            let message = queue.end.as_ref().map(|end| end.message_type());
+            (queue.plan.name.as_str(), message)
+        });
+        let wires = self.queues.iter().enumerate().flat_map(|(at, queue)| {
+            let into = queue.senders.iter().map(move |wire| row_of_queue(wire.from, at, true));
+            into.chain(queue.receivers.iter().map(move |wire| row_of_queue(wire.to, at, false)))
+        });
+        (queues.collect(), wires.collect())
     }
 
     fn of_queue(&mut self, number: u64, change: impl FnOnce(&mut Queue)) {
@@ -397,7 +415,7 @@ impl Router {
         }
     }
 
-    fn port_name(&self, (id, port): PortId) -> String {
+    pub(super) fn port_name(&self, (id, port): PortId) -> String {
         self.by_id(id)
             .map_or_else(String::new, |known| format!("{}.{}", known.plan.name, known.kind.ports[port].name))
     }

@@ -20,6 +20,7 @@ impl Router {
             Ok(()) => {
                 let script = self.decide(staged);
                 self.finish(script, fabric);
+                self.publish(fabric);
                 Ok(())
             }
             Err(refusal) => {
@@ -85,5 +86,6 @@ impl Router {
     pub(crate) fn settle(&mut self, staged: Staged, fabric: &mut dyn Fabric) {
         let script = self.decide(staged);
         self.finish(script, fabric);
+        self.publish(fabric);
     }
 }

@@ -100,6 +100,11 @@ pub(super) struct Script {
 }
 
 impl Script {
+    /// Whether it has this number.
+    pub(super) fn is(&self, number: u64) -> bool {
+        self.number == number
+    }
+
     /// The executor to which the next step can be given now.
     fn next_executor(&self) -> Option<usize> {
         let next = self.steps.front()?.executor;
@@ -301,10 +306,12 @@ impl Router {
         let Some(known) = self.agents.get_mut(&id) else { return };
         known.stats.restarts.store(known.stats.restarts.load(Relaxed) + 1, Relaxed);
         (known.state, known.restart_at) = (AgentState::Running, Time::NEVER);
+        self.asking.changes();
         if core::mem::take(&mut known.starting) {
             let agent = known.plan.name.clone();
             self.incidents.push(Incident { time: self.now, agent, what: "started again".into() });
         }
+        self.tell_anew(id);
     }
 
     fn not_drained(&mut self, executor: usize, number: u64) {

@@ -59,6 +59,7 @@ impl Router {
 
     /// From here on it will be done. Gives the number of the script that says what is left to do.
     pub(super) fn decide(&mut self, staged: Staged) -> u64 {
+        self.asking.changes();
         staged.decided.into_iter().for_each(|then| then(self));
         if staged.ranks || !staged.orders.is_empty() {
             self.rank_receivers();

@@ -33,13 +33,15 @@ impl Router {
     pub(super) fn view_agent(&self, known: &Known) -> AgentView {
         let stats = &known.stats;
         let executor = &self.executors[known.executor];
-        let ports = known.kind.ports.iter().zip(&known.ends).map(|(port, end)| PortView {
-            name: port.name,
-            doc: port.doc,
-            direction: port.shape.direction,
-            message: port.shape.input.or(port.shape.output).map_or("", |message| message.short_name()),
-            sent: end.output.as_ref().map_or(0, |output| output.sent()),
-        });
+        let ports =
+            known.kind.ports.iter().zip(&known.ends).enumerate().map(|(place, (port, end))| PortView {
+                name: port.name,
+                doc: port.doc,
+                direction: port.shape.direction,
+                message: port.shape.input.or(port.shape.output).map_or("", |message| message.short_name()),
+                sent: end.output.as_ref().map_or(0, |output| output.sent()),
+                asked: self.asked_through((known.id, place)),
+            });
         AgentView {
             id: known.id,
             name: known.plan.name.clone(),

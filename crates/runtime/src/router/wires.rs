@@ -13,7 +13,7 @@ use crate::service::answers_for;
 use types::{Filter, Priority, Time};
 
 impl Router {
-    fn find_wire(&self, from: PortId, to: PortId) -> Option<&Wire> {
+    pub(super) fn find_wire(&self, from: PortId, to: PortId) -> Option<&Wire> {
         let wires = self.agents.get(&from.0)?.wires.iter().filter_map(|id| self.wires.get(id));
         wires.into_iter().find(|wire| wire.from == from && wire.to == to && !wire.is_answer)
     }

@@ -2,6 +2,7 @@
 
 #![allow(clippy::unwrap_used)] // a test may
 
+mod asking;
 mod calls;
 mod cuts;
 mod deaths;
@@ -17,8 +18,8 @@ mod thousand;
 mod wall;
 
 use runtime::{
-    Agent, Client, Direction, Fault, FaultKind, Input, Options, Output, Params, Plan, QueuePlan, Refusal,
-    Registry, Reply, Request, Service, Simulation, Step, TimedRequest, WirePlan, registry,
+    Agent, AgentPlan, Client, Direction, Fault, FaultKind, Input, Options, Output, Params, Plan, QueuePlan,
+    Refusal, Registry, Reply, Request, Service, Simulation, Step, TimedRequest, WirePlan, registry,
 };
 use std::sync::{Arc, Mutex};
 use types::messages::{Image, Twist};
@@ -119,6 +120,12 @@ fn parse(words: &[String]) -> Result<Request, Refusal> {
             more.iter().for_each(|key| params.set(key, Value::from(true)));
             Request::Replace { agent: agent.into(), kind: kind.into(), params }
         }
+        ["add", name, kind] => Request::Add(AgentPlan {
+            name: name.into(),
+            kind: kind.into(),
+            period: Some(Duration::millis(10)),
+            ..AgentPlan::default()
+        }),
         ["queue", name] => Request::Queue(QueuePlan::new(name)),
         ["remove", agent] => Request::Remove(agent.into()),
         ["restart", agent] => Request::Restart(agent.into()),
