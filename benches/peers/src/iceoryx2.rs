@@ -1,4 +1,4 @@
-//! iceoryx2: publish and subscribe over shared memory between two threads, the receiver polls.
+//! iceoryx2: publish and subscribe over shared memory; within one thread, and between two of which the receiver polls.
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
@@ -8,18 +8,23 @@ use iceoryx2::port::subscriber::Subscriber;
 use iceoryx2::prelude::{LogLevel, NodeBuilder, ServiceName, ipc, set_log_level};
 
 use crate::document::{Document, Figure};
-use crate::machine::{Granted, end, now, room, settle, start};
+use crate::machine::{Granted, end, now, room, settle, sleep_until, start};
 use crate::settings::Settings;
 
 /// The other system.
 pub(crate) const PEER: &str = "iceoryx2";
 
-/// One way, from before the loan until the message is received. A camera picture is 230 400 bytes: `send_230400` begins when it
-/// stands in the loaned memory already, `filled_230400` before the loan, with the copying of the picture into it.
-pub(crate) const FIGURES: &[&str] = &["send_64", "send_230400", "filled_230400"];
+/// `hop_64`, `hop_230400`: in one thread, from before the sending of what stands in loaned memory until it is received, at a pace. The
+/// others are one way between two threads, from before the loan until the message is received. A camera picture is 230 400 bytes:
+/// `send_230400` begins when it stands in the loaned memory already, `filled_230400` before the loan, with the copying of the picture into it.
+pub(crate) const FIGURES: &[&str] = &["hop_64", "hop_230400", "send_64", "send_230400", "filled_230400"];
 
 /// Messages of each size where nobody says how many.
 const ITERATIONS: u64 = 20_000;
+/// Messages in one thread, those before anything is kept, and the time between them (ns) where nobody says.
+const HOPS: u64 = 2_000;
+const WARM_UP: u64 = 100;
+const PERIOD: u64 = 100_000;
 /// After so many looks the thread lets another run, which may be the one that it waits for.
 const LOOKS: u64 = 10_000;
 
@@ -41,6 +46,11 @@ pub(crate) fn measure(settings: &Settings) -> Result<Document, String> {
     }
     // Its remark that nobody configured it is of no use here.
     set_log_level(LogLevel::Error);
+    let hops = |size| {
+        let wanted = settings.clone();
+        end(start("peers-hops", move || hops(&wanted, size))?)?
+    };
+    let (small_hops, large_hops) = (hops(64)?, hops(230_400)?);
     let iterations = settings.iterations_or(ITERATIONS);
     let (mut granted, small) = way(&settings, 64, iterations)?;
     let (more, large) = way(&settings, 230_400, iterations.div_ceil(10))?;
@@ -50,11 +60,48 @@ pub(crate) fn measure(settings: &Settings) -> Result<Document, String> {
         version: env!("VERSION_ICEORYX2").to_owned(),
         granted,
         figures: vec![
+            Figure::times("hop_64", small_hops),
+            Figure::times("hop_230400", large_hops),
             Figure::times("send_64", small.from_loan),
             Figure::times("send_230400", large.from_send),
             Figure::times("filled_230400", large.from_loan),
         ],
     })
+}
+
+/// Sends and receives in one thread, as agents of one executor do, at a pace; how long each took (ns). The bytes stay as they are: what
+/// either side does with them is its own affair.
+fn hops(settings: &Settings, size: usize) -> Result<Vec<u64>, String> {
+    settle("hops", settings, 0);
+    let name = format!("peers-{}-hop-{size}", std::process::id());
+    let subscriber = connect(&name, |factory| {
+        factory.subscriber_builder().create().map_err(|error| format!("no subscriber: {error}"))
+    })?;
+    let publisher = connect(&name, |factory| {
+        let builder = factory.publisher_builder().initial_max_slice_len(size);
+        builder.create().map_err(|error| format!("no publisher: {error}"))
+    })?;
+    let messages = settings.iterations_or(HOPS);
+    let period = settings.period.unwrap_or(PERIOD);
+    let mut spans = room(messages);
+    let picture = vec![1u8; size];
+    let begun = now();
+    for round in 1..=WARM_UP + messages {
+        let sample = publisher.1.loan_slice_uninit(size).map_err(|error| format!("loan: {error}"))?;
+        let sample = sample.write_from_slice(&picture);
+        sleep_until(begun + round * period);
+        let before = now();
+        sample.send().map_err(|error| format!("send: {error}"))?;
+        let sample = subscriber.1.receive().map_err(|error| format!("receive: {error}"))?;
+        let after = now();
+        if sample.is_none_or(|sample| sample.payload().len() != size) {
+            return Err(format!("message {round} did not come"));
+        }
+        if round > WARM_UP {
+            spans.push(after - before);
+        }
+    }
+    Ok(spans)
 }
 
 /// How long messages took (ns).

@@ -46,6 +46,9 @@ Prints one JSON document.
   --phase NS        the remainder of the times of iterations by the period, on the monotonic clock (nanosleep)
   --fifo PRIORITY   SCHED_FIFO for its threads; the document says what was granted";
 
+/// Why iceoryx2 cannot be measured, where its feature is off.
+const NOT_BUILT_IN: &str = "iceoryx2 is not built in: it is where libclang is (Debian: apt-get install libclang-dev); then `cargo xtask peers` builds this program anew";
+
 fn main() -> ExitCode {
     let words: Vec<String> = std::env::args().skip(1).collect();
     let words: Vec<&str> = words.iter().map(String::as_str).collect();
@@ -63,6 +66,7 @@ fn main() -> ExitCode {
             return ExitCode::SUCCESS;
         }
         [name, ref rest @ ..] => match (measurements::named(name), Settings::read(rest)) {
+            (None, _) if name == "iceoryx2" => (1, NOT_BUILT_IN.to_owned()),
             (None, _) => (2, format!("there is no measurement \"{name}\"\n\n{USAGE}")),
             (_, Err(what)) => (2, format!("{what}\n\n{USAGE}")),
             (Some(measurement), Ok(settings)) => match (measurement.measure)(&settings) {

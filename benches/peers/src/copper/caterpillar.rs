@@ -8,7 +8,7 @@ use serde::{Deserialize, Serialize};
 
 use super::hop::each;
 use super::log::{LogFolder, iterations_in};
-use super::part::Part;
+use super::part::{Part, WARM_UP};
 use super::{document, failed};
 use crate::document::{Document, Figure};
 use crate::machine::{means, now, settle};
@@ -17,20 +17,17 @@ use crate::settings::Settings;
 /// `iteration`: mean over 1000 of them, as fast as they can be. `missing`: iterations that are not in the log.
 pub(crate) const FIGURES: &[&str] = &["iteration", "iteration_each", "rate", "missing", "log_size"];
 
-/// Of the processor, for each iteration, as means of a tenth of the run: `work`: what the iteration itself takes of its thread;
-/// `thread`: the same with the sleep before it and with being measured; `process`: of all threads.
+/// As those of the hop with its log.
 pub(crate) const PACED_FIGURES: &[&str] =
-    &["iteration_each", "work", "thread", "process", "missing", "log_size"];
+    &["iteration_each", "rate", "thread", "process", "missing", "log_size"];
 
 /// Iterations where nobody says how many, and how many make a mean.
 const ITERATIONS: u64 = 100_000;
 const BLOCK: u64 = 1000;
-/// At a pace: iterations where nobody says how many, the time between them (ns), in how many parts they are divided, and in how
-/// many nothing is done for comparison.
+/// At a pace: iterations where nobody says how many, the time between them (ns), and in how many parts they are divided.
 const PACED: u64 = 20_000;
 const PERIOD: u64 = 100_000;
 const PARTS: u64 = 10;
-const IDLE: u64 = 5_000;
 /// The room that the example reserves for its log (bytes).
 const SLAB: usize = 1 << 30;
 
@@ -156,10 +153,10 @@ pub(crate) fn measure(settings: &Settings) -> Result<Document, String> {
 pub(crate) fn paced(settings: &Settings) -> Result<Document, String> {
     let folder = LogFolder::make()?;
     let granted = settle("caterpillar_paced", settings, 0);
-    let clock = RobotClock::default();
     let period = settings.period.unwrap_or(PERIOD);
     let part = settings.iterations_or(PACED).div_ceil(PARTS);
-    let builder = Caterpillar::builder().with_clock(clock.clone()).with_log_path(folder.base(), Some(SLAB));
+    let builder =
+        Caterpillar::builder().with_clock(RobotClock::default()).with_log_path(folder.base(), Some(SLAB));
     let app = builder.and_then(|builder| builder.build()).map_err(failed)?;
     let mut app = app.start().map_err(failed)?;
     let mut result = Ok(());
@@ -168,19 +165,20 @@ pub(crate) fn paced(settings: &Settings) -> Result<Document, String> {
             result = app.run_one_iteration();
         }
     };
-    let parts: Vec<Part> = (0..PARTS).map(|_| Part::run(part, period, &clock, &mut iterate)).collect();
+    (0..WARM_UP).for_each(|_| iterate());
+    let parts: Vec<Part> = (0..PARTS).map(|_| Part::run(part, period, &mut iterate)).collect();
     result.map_err(failed)?;
     drop(app.stop().map_err(failed)?);
-    let idle = Part::run(IDLE, period, &clock, || ());
     let written = iterations_in::<default::CuStampedDataSet>(&folder.base())?;
-    let means = |of: fn(&Part) -> f64, less: f64| parts.iter().map(|part| of(part) - less).collect();
+    let missing = (WARM_UP + PARTS * part).saturating_sub(written);
+    let means = |of: fn(&Part) -> f64| parts.iter().map(of).collect();
     Ok(document(
         granted,
         vec![
-            Figure::new("work", "ns", means(|part| part.work, idle.work)),
-            Figure::new("thread", "ns", means(|part| part.thread, 0.0)),
-            Figure::new("process", "ns", means(|part| part.process, 0.0)),
-            Figure::new("missing", "1", vec![(PARTS * part).saturating_sub(written) as f64]),
+            Figure::new("rate", "1/s", means(|part| 1e9 / part.whole)),
+            Figure::new("thread", "ns", means(|part| part.thread)),
+            Figure::new("process", "ns", means(|part| part.process)),
+            Figure::new("missing", "1", vec![missing as f64]),
             Figure::new("log_size", "B", vec![folder.size() as f64]),
             Figure::times("iteration_each", parts.into_iter().flat_map(|part| part.spans).collect()),
         ],

@@ -7,11 +7,14 @@
 //! | one message to 64 receivers | [`fanout`] |
 //! | a large message beside a small one | [`picture`] |
 //! | a source, eight agents and eight sinks, with a log | [`caterpillar`] |
-//! | what these share: agents, and runs with a log | [`chain`], [`recorded`] |
+//! | what these share: agents, runs with a log | [`chain`], [`recorded`] |
+//! | how whole iterations are timed, and set beside copper's | [`iteration`], [`beside`] |
 
+mod beside;
 mod caterpillar;
 mod chain;
 mod fanout;
+mod iteration;
 mod lap;
 mod logged;
 mod picture;

@@ -19,6 +19,8 @@ pub(super) struct Ratio {
     ours: f64,
     theirs: f64,
     value: f64,
+    /// The least and the greatest of all rounds, where there were several.
+    range: Option<[f64; 2]>,
 }
 
 /// What a measurement gives.
@@ -92,7 +94,9 @@ impl Outcome {
         }
         rounds.sort_by(|a, b| (a.0 / a.1).total_cmp(&(b.0 / b.1)));
         if let Some(&(ours, theirs)) = rounds.get(rounds.len() / 2) {
-            self.ratios.push(Ratio { name, ours, theirs, value: ours / theirs });
+            let ends = [rounds.first(), rounds.last()].map(|round| round.map_or(0.0, |(a, b)| a / b));
+            let range = (rounds.len() > 1).then_some(ends);
+            self.ratios.push(Ratio { name, ours, theirs, value: ours / theirs, range });
         }
     }
 
@@ -101,7 +105,7 @@ impl Outcome {
         let ratios = [0.5, 0.99].map(|share| (ours.at(share), theirs.at(share)));
         let [middle, tail] = ratios;
         let (ours, theirs) = if middle.0 / middle.1 >= tail.0 / tail.1 { middle } else { tail };
-        self.ratios.push(Ratio { name, ours, theirs, value: ours / theirs });
+        self.ratios.push(Ratio { name, ours, theirs, value: ours / theirs, range: None });
     }
 
     /// A ratio cannot be had; because of a failure of the other system, or because it is not there.
@@ -142,7 +146,12 @@ impl Outcome {
 
     pub(super) fn to_json(&self, name: &str) -> Json {
         let ratios = self.ratios.iter().map(|ratio| {
-            json!({"name": ratio.name, "ours": ratio.ours, "theirs": ratio.theirs, "value": ratio.value})
+            let mut row =
+                json!({"name": ratio.name, "ours": ratio.ours, "theirs": ratio.theirs, "value": ratio.value});
+            if let Some(range) = ratio.range {
+                row["range"] = json!(range);
+            }
+            row
         });
         let granted = self.granted.iter().map(|(thread, policy)| json!({"thread": thread, "policy": policy}));
         json!({
@@ -174,12 +183,14 @@ impl Outcome {
         }
         out += &crate::run::table(&rows, 2);
         for ratio in &self.ratios {
+            let range = ratio.range.map(|[least, most]| format!("; rounds from {least:.2} to {most:.2}"));
             out += &format!(
-                "  {}: {:.2} (ours {}, theirs {})\n",
+                "  {}: {:.2} (ours {}, theirs {}{})\n",
                 ratio.name,
                 ratio.value,
                 number(ratio.ours),
-                number(ratio.theirs)
+                number(ratio.theirs),
+                range.unwrap_or_default()
             );
         }
         for (thread, policy) in &self.granted {
@@ -211,6 +222,7 @@ mod tests {
         let mut outcome = Outcome::default();
         outcome.compare("a/b", vec![(9.0, 1.0), (2.0, 1.0), (3.0, 3.0)]);
         assert_eq!((outcome.ratios[0].ours, outcome.ratios[0].value), (2.0, 2.0));
+        assert_eq!(outcome.ratios[0].range, Some([1.0, 9.0]));
         let ours = Measured::new("ours", "ns", [vec![2.0; 98], vec![30.0; 2]].concat());
         let theirs = Measured::new("theirs", "ns", [vec![1.0; 98], vec![20.0; 2]].concat());
         outcome.compare_tails("c/d", &ours, &theirs);

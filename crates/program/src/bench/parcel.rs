@@ -45,11 +45,6 @@ pub(super) fn monotonic(time: Time, offset: u64) -> u64 {
     (time.0 as u64).saturating_sub(offset)
 }
 
-/// Processor time of the calling thread (ns).
-pub(super) fn thread_time() -> u64 {
-    nanoseconds(ClockId::ThreadCPUTime)
-}
-
 /// Processor time of all threads of this process (ns).
 pub(super) fn process_time() -> u64 {
     nanoseconds(ClockId::ProcessCPUTime)

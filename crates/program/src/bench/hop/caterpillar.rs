@@ -1,28 +1,31 @@
 //! A source, eight agents that hand on and a sink beside each of them, with a log of all that is sent: the shape of copper's own
 //! example of this name, at the same rate as it.
-//!
-//! Compared is what an iteration takes of the processor of the thread that runs the agents, less what sleeping takes.
 
 use runtime::{Agent, AgentType, Declare as _, Fault, Input, Output, Plan, Registry, Step};
-use types::{Duration, Message};
+use types::Message;
 
-use super::{CPU, recorded};
+use super::beside::{self, PERIOD, Ran, Work};
+use super::iteration::{Ending, Iteration};
+use super::recorded;
 use crate::bench::Setting;
 use crate::bench::outcome::Outcome;
-use crate::bench::parcel::{Shelf, process_time, thread_time, until};
-use crate::bench::turns::{Turns, mean};
+use crate::bench::parcel::{Shelf, now, process_time, until};
 use crate::error::Failure;
 use std::hint::black_box;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
-/// Iterations of a round, the time between them, and rounds.
-const ITERATIONS: usize = 20_000;
-const PERIOD: Duration = Duration::micros(100);
-const ROUNDS: usize = 3;
+/// Iterations before anything is kept.
 const WARM_UP: u64 = 100;
 /// Agents that hand on.
 const SEGMENTS: usize = 8;
+const WORK: Work = Work {
+    name: "caterpillar",
+    theirs: "caterpillar_paced",
+    ratios: ["caterpillar/copper", "caterpillar_mean/copper", "caterpillar_p99/copper"],
+    prefix: "caterpillar_",
+    messages: 1.0 + SEGMENTS as f64,
+};
 
 /// Whether a light is on.
 #[derive(Clone, Copy, Debug, Default, Message)]
@@ -39,26 +42,30 @@ struct Head {
     out: Output<Light>,
     number: u64,
     messages: u64,
-    /// What thread and process had used when the first message that counts was sent.
+    /// What the process had used, and what time it was, when the first message that counts was sent.
     used: [u64; 2],
     shelf: Shelf,
     over: Arc<AtomicBool>,
+    iteration: Option<Iteration>,
 }
 
 impl Agent for Head {
     fn step(&mut self, _: &mut Step) -> Result<(), Fault> {
-        self.number += 1;
-        if self.number == WARM_UP + 1 {
-            self.used = [thread_time(), process_time()];
+        if self.number == WARM_UP {
+            self.used = [process_time(), now()];
         }
-        if self.number > WARM_UP + self.messages {
+        if self.number == WARM_UP + self.messages {
             if !self.over.load(Ordering::Relaxed) {
-                let used = [thread_time() - self.used[0], process_time() - self.used[1]];
-                self.shelf.put(&used.map(|used| used as f64 / self.messages as f64));
+                let used = [process_time() - self.used[0], now() - self.used[1]];
+                self.shelf.put(&used.map(|used| used as f64));
                 self.over.store(true, Ordering::Release);
             }
             return Ok(());
         }
+        if let Some(iteration) = &self.iteration {
+            iteration.begin();
+        }
+        self.number += 1;
         self.out.send(Light { on: (self.number % 2) as u8 });
         Ok(())
     }
@@ -88,14 +95,40 @@ struct Foot {
     /// What comes.
     take: Input<Light>,
     on: bool,
+    iteration: Option<Iteration>,
 }
 
 impl Agent for Foot {
     fn step(&mut self, _: &mut Step) -> Result<(), Fault> {
         while let Some(light) = self.take.take() {
             self.on = black_box(light.on != 0);
+            if let Some(iteration) = &self.iteration {
+                iteration.sink();
+            }
         }
         Ok(())
+    }
+}
+
+/// Comes after all others and says when an iteration is over.
+#[derive(Agent)]
+struct Tail {
+    /// What the last foot is told, too.
+    take: Input<Light>,
+    ending: Ending,
+}
+
+impl Agent for Tail {
+    fn step(&mut self, _: &mut Step) -> Result<(), Fault> {
+        let time = now();
+        while self.take.take().is_some() {
+            self.ending.end(time);
+        }
+        Ok(())
+    }
+
+    fn stop(&mut self, _: &mut Step) {
+        self.ending.put();
     }
 }
 
@@ -112,63 +145,44 @@ fn plan() -> Plan {
         names.iter().for_each(|name| plan.on(name, "take"));
         last = segment.give;
     }
+    // Of those that wait for the same output the first by name comes first.
+    let tail = plan.add::<Tail>("tail", Default::default());
+    plan.wire(&last, &tail.take);
+    plan.on("tail", "take");
     super::on_one_executor(&mut plan);
     plan
 }
 
-/// Processor time of an iteration: that of the executor's thread, and that of the process (ns).
-fn run(iterations: usize, outcome: &mut Outcome) -> Result<([f64; 2], Option<Failure>), Failure> {
+fn run(iterations: usize, outcome: &mut Outcome) -> Result<Ran, Failure> {
     let (shelf, over) = (Shelf::default(), Arc::new(AtomicBool::new(false)));
+    let iteration = Iteration::of(SEGMENTS as u64, WARM_UP, iterations);
     let (kept, ends) = (shelf.clone(), over.clone());
+    let [head, foot, tail] = [(); 3].map(|()| iteration.clone());
     let registry = Registry::new([
         AgentType::made_by(move |params| Head {
             messages: iterations as u64,
             shelf: kept.clone(),
             over: ends.clone(),
+            iteration: Some(head.clone()),
             ..Head::build(params)
         })
         .named("head"),
         AgentType::of::<Segment>(),
-        AgentType::of::<Foot>(),
+        AgentType::made_by(move |params| Foot { iteration: Some(foot.clone()), ..Foot::build(params) })
+            .named("foot"),
+        AgentType::made_by(move |params| Tail { ending: Ending::of(&tail), ..Tail::build(params) })
+            .named("tail"),
     ]);
     let options = until(&over, PERIOD * iterations as i64);
     let kept = recorded::run(&plan(), &registry, options, outcome)?;
-    let &[thread, process] = &shelf.take()[..] else {
+    let &[process, whole] = &shelf.take()[..] else {
         return Err(Failure::new("the lights were not all sent in time").code(1));
     };
-    Ok(([thread, process], kept.failure()))
+    let iterations = iterations as f64;
+    Ok(Ran { spans: iteration.spans()?, process: process / iterations, rate: iterations * 1e9 / whole, kept })
 }
 
 /// Rounds of ours and of copper's, in turns.
 pub(super) fn measure(setting: &Setting<'_>, outcome: &mut Outcome) -> Result<(), Failure> {
-    let iterations = setting.of(ITERATIONS, 500);
-    let mut turns = Turns::new(setting.peers.clone());
-    let (mut rounds, mut lossy) = (Vec::new(), None);
-    let (mut works, mut processes) = (Vec::new(), Vec::new());
-    let (mut their_works, mut their_processes) = (Vec::new(), Vec::new());
-    let args = ["--iterations".to_owned(), iterations.to_string(), "--cpu".to_owned(), CPU.to_string()];
-    for _ in 0..setting.of(ROUNDS, if setting.shorter > 100 { 1 } else { 3 }) {
-        let before = recorded::idle(PERIOD)?;
-        let ([thread, process], lost) = run(iterations, outcome)?;
-        let work = thread - (before + recorded::idle(PERIOD)?) / 2.0;
-        lossy = lost.or(lossy);
-        works.push(work);
-        processes.push(process);
-        let mut round = turns.round("caterpillar_paced", &args);
-        let their_work = turns.take(&mut round, "work", "ns");
-        if !their_work.is_empty() {
-            rounds.push((work, mean(&their_work)));
-            their_works.push(mean(&their_work));
-            their_processes.push(mean(&turns.take(&mut round, "process", "ns")));
-        }
-    }
-    outcome.figure("caterpillar_work", "ns", works);
-    outcome.figure("caterpillar_process_time", "ns", processes);
-    outcome.figure("caterpillar_work_copper", "ns", their_works);
-    outcome.figure("caterpillar_process_time_copper", "ns", their_processes);
-    match lossy {
-        Some(failure) => outcome.without("caterpillar/copper", Some(failure)),
-        None => turns.compare(outcome, "caterpillar/copper", rounds),
-    }
-    Ok(())
+    beside::measure(setting, outcome, &WORK, &mut run)
 }

@@ -1,4 +1,4 @@
-//! The agents of a chain that a clock drives: a source, who hands on, a sink.
+//! The agents of a chain that a clock drives: a source, who hands on, a sink; and where whole iterations are timed, one who comes after all.
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -6,7 +6,9 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use runtime::{Agent, AgentType, Declare as _, Fault, Input, Options, Output, Plan, Registry, Step};
 use types::Duration;
 
-use crate::bench::parcel::{Parcel, Shelf, keep, now, process_time, room, thread_time, until};
+use super::iteration::{Ending, Iteration};
+use crate::bench::parcel::{Parcel, Shelf, keep, now, process_time, room, until};
+use crate::error::Failure;
 
 /// Messages before anything is kept.
 const WARM_UP: u64 = 100;
@@ -14,11 +16,12 @@ const WARM_UP: u64 = 100;
 /// What a run of the chain leaves.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Trace {
-    /// From the source's step to the sink's, of each message (ns).
+    /// From the source's step to the sink's, of each message (ns); nothing where iterations are timed.
     pub(super) spans: Shelf,
-    /// From the first message that counts to the last: processor time of the executor's thread and of the process, and the time that
-    /// went by (ns).
-    pub(super) used: Shelf,
+    /// Whole iterations, where they are timed.
+    pub(super) iteration: Option<Iteration>,
+    /// From the first message that counts to the last: processor time of the process, and the time that went by (ns).
+    used: Shelf,
     over: Arc<AtomicBool>,
     /// Messages that count.
     messages: u64,
@@ -29,6 +32,20 @@ impl Trace {
         Trace { messages: messages as u64, ..Trace::default() }
     }
 
+    /// Times whole iterations in place of the way of each message.
+    pub(super) fn of_iterations(messages: usize) -> Trace {
+        Trace { iteration: Some(Iteration::of(1, WARM_UP, messages)), ..Trace::of(messages) }
+    }
+
+    /// Processor time of the process for each message that counts (ns), and how many of them were sent in a second.
+    pub(super) fn each(&self) -> Result<(f64, f64), Failure> {
+        let &[process, whole] = &self.used.take()[..] else {
+            return Err(Failure::new("the messages were not all sent in time").code(1));
+        };
+        let messages = self.messages as f64;
+        Ok((process / messages, messages * 1e9 / whole))
+    }
+
     /// Options of a run that ends when all messages are sent, at a period.
     pub(super) fn options(&self, period: Duration) -> Options {
         until(&self.over, period * self.messages as i64)
@@ -36,7 +53,7 @@ impl Trace {
 
     /// The agents.
     pub(super) fn registry(&self) -> Registry {
-        let (source, sink) = (self.clone(), self.clone());
+        let (source, sink, last) = (self.clone(), self.clone(), self.iteration.clone());
         Registry::new([
             AgentType::made_by(move |params| Source { trace: source.clone(), ..Source::build(params) })
                 .named("source"),
@@ -47,6 +64,11 @@ impl Trace {
                 ..Sink::build(params)
             })
             .named("sink"),
+            AgentType::made_by(move |params| Tail {
+                ending: last.as_ref().map(Ending::of).unwrap_or_default(),
+                ..Tail::build(params)
+            })
+            .named("tail"),
         ])
     }
 }
@@ -57,27 +79,28 @@ pub(super) struct Source {
     /// The parcel.
     pub(super) out: Output<Parcel>,
     number: u64,
-    /// What thread and process had used, and what time it was, when the first message that counts was sent.
-    used: [u64; 3],
+    /// What the process had used, and what time it was, when the first message that counts was sent.
+    used: [u64; 2],
     trace: Trace,
 }
 
 impl Agent for Source {
     fn step(&mut self, _: &mut Step) -> Result<(), Fault> {
-        self.number += 1;
-        if self.number == WARM_UP + 1 {
-            self.used = [thread_time(), process_time(), now()];
+        if self.number == WARM_UP {
+            self.used = [process_time(), now()];
         }
-        if self.number > WARM_UP + self.trace.messages {
+        if self.number == WARM_UP + self.trace.messages {
             if !self.trace.over.load(Ordering::Relaxed) {
-                let [thread, process, begun] = self.used;
-                let used = [thread_time() - thread, process_time() - process, now() - begun];
+                let [process, begun] = self.used;
+                let used = [process_time() - process, now() - begun];
                 self.trace.used.put(&used.map(|used| used as f64));
                 self.trace.over.store(true, Ordering::Release);
             }
             return Ok(());
         }
-        self.out.send(Parcel { sent: now(), number: self.number, ..Parcel::default() });
+        let sent = self.trace.iteration.as_ref().map_or_else(now, Iteration::begin);
+        self.number += 1;
+        self.out.send(Parcel { sent, number: self.number, ..Parcel::default() });
         Ok(())
     }
 }
@@ -112,7 +135,9 @@ pub(super) struct Sink {
 impl Agent for Sink {
     fn step(&mut self, _: &mut Step) -> Result<(), Fault> {
         while let Some(parcel) = self.take.take() {
-            if parcel.number > WARM_UP {
+            if let Some(iteration) = &self.trace.iteration {
+                iteration.sink();
+            } else if parcel.number > WARM_UP {
                 keep(&mut self.spans, now().saturating_sub(parcel.sent) as f64);
             }
         }
@@ -124,8 +149,30 @@ impl Agent for Sink {
     }
 }
 
-/// A source at a period, three who hand on and a sink, on one executor.
-pub(super) fn plan(period: Duration) -> Plan {
+/// Comes after all others and says when an iteration is over.
+#[derive(Agent)]
+pub(super) struct Tail {
+    /// What the sink is told, too.
+    pub(super) take: Input<Parcel>,
+    ending: Ending,
+}
+
+impl Agent for Tail {
+    fn step(&mut self, _: &mut Step) -> Result<(), Fault> {
+        let time = now();
+        while self.take.take().is_some() {
+            self.ending.end(time);
+        }
+        Ok(())
+    }
+
+    fn stop(&mut self, _: &mut Step) {
+        self.ending.put();
+    }
+}
+
+/// A source at a period, three who hand on and a sink, on one executor; and where iterations are timed, one who comes after all of them.
+pub(super) fn plan(period: Duration, iterations: bool) -> Plan {
     let mut plan = Plan::new("hop");
     let source = plan.add::<Source>("source", Default::default());
     let hands = ["first", "second", "third"].map(|name| plan.add::<Hand>(name, Default::default()));
@@ -137,6 +184,12 @@ pub(super) fn plan(period: Duration) -> Plan {
     plan.every("source", period);
     for name in ["first", "second", "third", "sink"] {
         plan.on(name, "take");
+    }
+    if iterations {
+        // Of those that wait for the same output the first by name comes first.
+        let tail = plan.add::<Tail>("tail", Default::default());
+        plan.wire(&hands[2].give, &tail.take);
+        plan.on("tail", "take");
     }
     super::on_one_executor(&mut plan);
     plan

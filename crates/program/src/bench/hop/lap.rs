@@ -231,7 +231,7 @@ pub(super) fn paced(setting: &Setting<'_>, outcome: &mut Outcome) -> Result<(), 
         words.iter().flat_map(|(name, value)| [(*name).to_owned(), value.to_string()]).collect();
     for _ in 0..setting.of(ROUNDS, 1) {
         let trace = Trace::of(messages);
-        let live = live(&chain::plan(PACE), &trace.registry(), trace.options(PACE))?;
+        let live = live(&chain::plan(PACE, false), &trace.registry(), trace.options(PACE))?;
         parcel::run(live, outcome)?;
         ours.extend(trace.spans.take());
         let mut round = turns.round("hop", &args);

@@ -1,4 +1,5 @@
-//! A picture of 230 400 bytes from its producer to its consumer through short-term memory, beside 64 bytes that travel by value.
+//! A picture of 230 400 bytes from its producer to its consumer through short-term memory, beside 64 bytes that travel by value; and both
+//! beside iceoryx2, where a thread sends the same bytes to itself through shared memory.
 //!
 //! A hop is timed from the sender's last look at the clock, when it has filled the message, to the receiver's first, when it has the
 //! message before it. What both do with the bytes is their own affair, so neither touches them, and the time is told beside the message.
@@ -10,9 +11,11 @@ use runtime::{Agent, AgentType, Declare as _, Fault, Input, Output, Plan, Regist
 use types::Duration;
 use types::messages::Image;
 
+use super::CPU;
 use crate::bench::Setting;
 use crate::bench::outcome::{Outcome, median};
 use crate::bench::parcel::{self, Parcel, Shelf, live, now, room};
+use crate::bench::turns::Turns;
 use crate::error::Failure;
 
 /// Bytes of a picture: 320 by 240, in three colours.
@@ -144,19 +147,43 @@ fn hops(pictures: bool, messages: usize, outcome: &mut Outcome) -> Result<Vec<f6
     Ok(hops)
 }
 
-/// Rounds of both, in turns.
+/// Rounds of both and of iceoryx2, in turns.
 pub(super) fn measure(setting: &Setting<'_>, outcome: &mut Outcome) -> Result<(), Failure> {
     let messages = setting.of(MESSAGES, 500);
+    let mut turns = [(); 2].map(|()| Turns::new(setting.peers.clone()));
+    let args = ["--iterations".to_owned(), messages.to_string(), "--cpu".to_owned(), format!("{CPU},1")];
     let (mut small, mut large, mut rounds) = (Vec::new(), Vec::new(), Vec::new());
+    let mut beside = [(); 2].map(|()| Beside::default());
     for _ in 0..setting.of(ROUNDS, if setting.shorter > 100 { 1 } else { 3 }) {
         let few = hops(false, messages, outcome)?;
         let many = hops(true, messages, outcome)?;
-        rounds.push((median(many.clone()), median(few.clone())));
+        let ours = [median(few.clone()), median(many.clone())];
+        rounds.push((ours[1], ours[0]));
         small.extend(few);
         large.extend(many);
+        let mut round = turns[0].round("iceoryx2", &args);
+        for (which, figure) in ["hop_64", "hop_230400"].into_iter().enumerate() {
+            let theirs = turns[which].take(&mut round, figure, "ns");
+            if !theirs.is_empty() {
+                beside[which].rounds.push((ours[which], median(theirs.clone())));
+                beside[which].theirs.extend(theirs);
+            }
+        }
     }
     outcome.figure("hop64", "ns", small);
     outcome.figure("picture", "ns", large);
     outcome.compare("picture/hop64", rounds);
+    let names = [("hop64_iceoryx2", "hop64/iceoryx2"), ("picture_iceoryx2", "picture/iceoryx2")];
+    for ((turns, beside), (figure, ratio)) in turns.into_iter().zip(beside).zip(names) {
+        outcome.figure(figure, "ns", beside.theirs);
+        turns.compare(outcome, ratio, beside.rounds);
+    }
     Ok(())
+}
+
+/// What iceoryx2 did, and ours and theirs of each round.
+#[derive(Default)]
+struct Beside {
+    theirs: Vec<f64>,
+    rounds: Vec<(f64, f64)>,
 }

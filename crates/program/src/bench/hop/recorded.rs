@@ -4,18 +4,11 @@ use std::path::PathBuf;
 
 use record::log::RunInfo;
 use runtime::{LogChoice, Options, Plan, Registry};
-use types::Duration;
 
-use crate::bench::outcome::{Outcome, median};
-use crate::bench::parcel::{self, live, now, pin, thread, thread_time};
+use crate::bench::outcome::Outcome;
+use crate::bench::parcel::{self, live};
 use crate::error::Failure;
 use crate::run::{Asked, Facts, LogFile};
-
-use super::CPU;
-
-/// What sleeping costs is the middle of the means of so many blocks, each of so many sleeps: the machine disturbs some of them.
-const BLOCKS: u64 = 9;
-const SLEEPS: u64 = 500;
 
 /// What became of the messages of a run.
 #[derive(Clone, Copy, Debug, Default)]
@@ -90,28 +83,4 @@ pub(super) fn run(
             + report.view.wires.iter().map(|wire| wire.dropped + wire.refused).sum::<u64>(),
         size: std::fs::metadata(&scratch.0).map_or(0, |data| data.len()),
     })
-}
-
-/// What it costs a bare thread to sleep until the next of many times at a period (ns of its processor): it is no part of the work.
-pub(super) fn idle(period: Duration) -> Result<f64, Failure> {
-    let sleeps = thread("bench-sleeps", move || {
-        pin(CPU);
-        let _ = rustix::thread::set_current_timer_slack(core::num::NonZeroU64::new(1));
-        let period = period.0 as u64;
-        let block = |_| {
-            let (begun, used) = (now(), thread_time());
-            for round in 1..=SLEEPS {
-                sleep_until(begun + round * period);
-            }
-            (thread_time() - used) as f64 / SLEEPS as f64
-        };
-        median((0..BLOCKS).map(block).collect())
-    })?;
-    parcel::end(sleeps)
-}
-
-fn sleep_until(time: u64) {
-    use rustix::time::{ClockId, Timespec};
-    let wanted = Timespec { tv_sec: (time / 1_000_000_000) as _, tv_nsec: (time % 1_000_000_000) as _ };
-    while rustix::thread::clock_nanosleep_absolute(ClockId::Monotonic, &wanted).is_err() && now() < time {}
 }
