@@ -17,6 +17,9 @@ use crate::workspace::Workspace;
 const REMEDY: &str = "Nothing that happens around a run may reach the robot. The same command by hand, with --json, shows what became of it.";
 /// What is run, and for how long.
 const RUN: [&str; 6] = ["run", "exploration", "--seed", "4", "--for", "20s"];
+/// The same on the wall clock; the disk is full after a second or two.
+const RUN_ON_THE_WALL: [&str; 8] = ["run", "exploration", "--seed", "4", "--clock", "wall", "--for", "5s"];
+const WALL_SECONDS: f64 = 4.9;
 
 pub(super) fn run(workspace: &Workspace) -> Result<Done, Failure> {
     let program = sinew::build(workspace)?;
@@ -25,14 +28,29 @@ pub(super) fn run(workspace: &Workspace) -> Result<Done, Failure> {
     let tool = Tool::new(&program, &workspace.root).args(RUN).args(["--json", "--out"]).arg(&usual);
     let document = sinew::document(tool, REMEDY)?;
     let scene = Scene { workspace, program, scratch, usual: usual.join("run.mcap"), document };
-    let lost = scene.full_disk()?;
+    let cut = scene.limited_file()?;
+    let full = scene.full_disk()?;
     scene.closed_output()?;
     let terminal = scene.closed_terminal()?;
     scene.rude_clients()?;
     let terminal = if terminal { "a closed terminal, " } else { "" };
-    Ok(Done::Passed(format!(
-        "a full disk ({lost} messages lost and told), closed output, {terminal}rude clients"
-    )))
+    let disk = match full {
+        Some(lost) => format!("a full disk ({lost} messages lost and told)"),
+        None => format!(
+            "no full disk, since none may be mounted here; in its place a limit on files ({cut} messages lost and told)"
+        ),
+    };
+    Ok(Done::Passed(format!("{disk}, closed output, {terminal}rude clients")))
+}
+
+/// How `unshare` is told to give a program mounts of its own, where that is permitted: as root, or as one who is root to himself.
+fn apart() -> Option<&'static [&'static str]> {
+    let ways: [&[&str]; 2] = [&["--mount"], &["--map-root-user", "--mount"]];
+    let permitted = |way: &&&[&str]| {
+        let script = "mount -t tmpfs -o size=64k sinew-hardship /tmp";
+        Tool::new("unshare", Path::new(".")).args(**way).args(["sh", "-c", script]).works()
+    };
+    ways.iter().find(permitted).copied()
 }
 
 /// What all of it is held against.
@@ -49,10 +67,9 @@ impl Scene<'_> {
         Failure::new(what, REMEDY)
     }
 
-    /// The log ends when no more can be written, the run does not.
-    fn full_disk(&self) -> Result<u64, Failure> {
-        let out = self.scratch.join("full");
-        // A limit on the length of files is a disk that is full after a megabyte; it takes no right to make one.
+    /// A limit on the length of files: the log ends when no more can be written, the run does not. It takes no right to set one.
+    fn limited_file(&self) -> Result<u64, Failure> {
+        let out = self.scratch.join("limited");
         let line = "ulimit -f 2048; exec \"$0\" \"$@\"";
         let tool = Tool::new("sh", &self.workspace.root).args(["-c", line]).arg(&self.program).args(RUN);
         let document = sinew::document(tool.args(["--json", "--out"]).arg(&out), REMEDY)?;
@@ -61,6 +78,58 @@ impl Scene<'_> {
             Tool::new(&self.program, &self.workspace.root).args(["log", "info"]).arg(out.join("run.mcap"));
         info.args(["--json"]).text(REMEDY)?;
         Ok(lost)
+    }
+
+    /// A disk of half a megabyte, in simulated time, where all goes the usual way, and on the wall clock. Nothing where none may be mounted.
+    fn full_disk(&self) -> Result<Option<u64>, Failure> {
+        let Some(apart) = apart() else {
+            println!(
+                "  a full disk: no file system may be mounted here (unshare and mount), so there is none"
+            );
+            return Ok(None);
+        };
+        let document = self.on_full_disk(apart, "full", &RUN)?;
+        let lost = went_on(&document, &self.document).map_err(Self::failed)?;
+        let document = self.on_full_disk(apart, "full-wall", &RUN_ON_THE_WALL)?;
+        let lasted = document["time_s"].as_f64().is_some_and(|time| time >= WALL_SECONDS);
+        if !lasted || document["collisions"] != 0 || document["log"]["lost"] == 0 {
+            return Err(Self::failed(format!("with a full disk a run on the wall clock gave {document}")));
+        }
+        Ok(Some(lost))
+    }
+
+    /// A run on a disk that nobody else sees, which is gone with the run. What was on it when it was full is told of, and mended.
+    fn on_full_disk(&self, apart: &[&str], name: &str, words: &[&str]) -> Result<Value, Failure> {
+        let (disk, kept) = (self.scratch.join(name), self.scratch.join(format!("{name}-kept")));
+        for folder in [&disk, &kept] {
+            std::fs::create_dir_all(folder)
+                .map_err(|error| Self::failed(format!("{}: {error}", folder.display())))?;
+        }
+        let script = self.workspace.root.join("xtask/src/steps/small_disk.sh");
+        let tool = Tool::new("unshare", &self.workspace.root).args(apart).arg("sh").arg(script);
+        let tool = tool.arg(&disk).arg(&kept).arg(&self.program).args(words).arg("--json");
+        let document = sinew::document(tool, REMEDY)?;
+        let told = kept.join("told.txt");
+        let told = std::fs::read_to_string(&told)
+            .map_err(|error| Self::failed(format!("{}: {error}", told.display())))?;
+        says_what_where_and_how(&told, &disk.join("out/run.mcap")).map_err(Self::failed)?;
+        let (cut, whole) = (kept.join("run.mcap"), kept.join("whole.mcap"));
+        let log = |words: [&str; 2]| Tool::new(&self.program, &self.workspace.root).args(words);
+        let mended =
+            sinew::document(log(["log", "repair"]).arg(&cut).arg("--out").arg(&whole).arg("--json"), REMEDY)?;
+        let info = sinew::document(log(["log", "info"]).arg(&whole).arg("--json"), REMEDY)?;
+        let written = &document["log"]["messages"];
+        if written == 0
+            || mended["messages"] != *written
+            || info["messages"] != *written
+            || info["whole"] != true
+        {
+            let what = format!(
+                "the run wrote {written} messages to the full disk, mended are {mended}, read {info}"
+            );
+            return Err(Self::failed(what));
+        }
+        Ok(document)
     }
 
     /// Nobody reads what the program says.
@@ -199,10 +268,33 @@ fn went_on(full: &Value, usual: &Value) -> Result<u64, String> {
     }
 }
 
+/// Whether a run said once that its disk is full, where, and what can be done.
+fn says_what_where_and_how(told: &str, log: &Path) -> Result<(), String> {
+    let place = log.display().to_string();
+    let lines: Vec<&str> = told.lines().filter(|line| line.contains("the log ends here")).collect();
+    match lines[..] {
+        [line] if line.contains(&place) && line.contains("sinew log repair") && line.contains("--out") => {
+            Ok(())
+        }
+        [line] => Err(format!("of a full disk it is not said where it is ({place}) and what to do: {line}")),
+        _ => Err(format!("a full disk is told {} times, and not once:\n{told}", lines.len())),
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
     use serde_json::json;
+
+    #[test]
+    fn a_full_disk_is_told_once_with_its_place_and_a_remedy() {
+        let log = Path::new("/d/run.mcap");
+        let line = "warning: /d/run.mcap: the log ends here: No space left on device; `sinew log repair /d/run.mcap`, or --out";
+        assert_eq!(says_what_where_and_how(&format!("begin\n{line}\n"), log), Ok(()));
+        assert!(says_what_where_and_how(&format!("{line}\n{line}"), log).unwrap_err().contains("2 times"));
+        assert!(says_what_where_and_how("", log).unwrap_err().contains("0 times"));
+        assert!(says_what_where_and_how(line, Path::new("/e/run.mcap")).unwrap_err().contains("where"));
+    }
 
     #[test]
     fn what_a_full_disk_costs_must_be_told_and_must_be_all() {

@@ -1,7 +1,7 @@
 //! From what agents send to the log file.
 
 use std::collections::{HashMap, VecDeque};
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex, PoisonError};
 
 use record::log::{ChannelId, RunInfo, Severity, Tally, WriteError, Writer};
@@ -38,6 +38,7 @@ pub(crate) type SharedOutcome = Arc<Mutex<LogOutcome>>;
 /// what the judge saw on `/truth/NAME`.
 pub(crate) struct LogFile {
     writer: Option<Writer>,
+    path: PathBuf,
     channels: HashMap<String, ChannelId>,
     kinds: HashMap<String, Kind>,
     pictures: HashMap<String, Pictures>,
@@ -106,6 +107,7 @@ impl LogFile {
         let outcome = SharedOutcome::default();
         let file = LogFile {
             writer: Some(Writer::create(path, run)?),
+            path: path.to_owned(),
             channels: HashMap::new(),
             kinds: HashMap::new(),
             pictures: HashMap::new(),
@@ -135,6 +137,14 @@ impl LogFile {
         }
     }
 
+    /// What cannot be written: said with where it is and what can be done, when the log has ended by it.
+    fn not_written(&self, error: &WriteError) {
+        match error {
+            WriteError::Ended(_) => self.failed(ended(&self.path, error)),
+            _ => self.failed(error),
+        }
+    }
+
     fn channel(&mut self, topic: &str, definition: &dyn Fn() -> Definition) -> Option<ChannelId> {
         if let Some(known) = self.channels.get(topic) {
             return Some(*known);
@@ -145,7 +155,7 @@ impl LogFile {
                 Some(channel)
             }
             Err(error) => {
-                self.failed(error);
+                self.not_written(&error);
                 None
             }
         }
@@ -156,7 +166,7 @@ impl LogFile {
         if let Some(Err(error)) =
             self.writer.as_mut().map(|out| out.write(channel, header, header.stamp, cdr))
         {
-            self.failed(error);
+            self.not_written(&error);
         }
     }
 
@@ -193,7 +203,7 @@ impl LogFile {
     fn write_note(&mut self, time: Time, who: &str, text: &str) {
         let severity = severity(text);
         if let Some(Err(error)) = self.writer.as_mut().map(|out| out.note(time, severity, who, text)) {
-            self.failed(error);
+            self.not_written(&error);
         }
     }
 
@@ -232,7 +242,7 @@ impl LogFile {
                 if let Some(Err(error)) =
                     self.writer.as_mut().map(|out| out.write(channel, header, header.stamp, &packed))
                 {
-                    self.failed(error);
+                    self.not_written(&error);
                 }
                 self.outcome().images += 1;
             }
@@ -284,12 +294,21 @@ impl Recorder for LogFile {
         match writer.finish() {
             Ok(tally) => self.outcome().tally = tally,
             Err(error) => {
-                self.failed(error);
+                self.not_written(&error);
                 self.outcome().tally = before;
             }
         }
         self.outcome().finished = true;
     }
+}
+
+/// What is said of a log that has ended before the run.
+fn ended(path: &Path, error: &WriteError) -> String {
+    let path = path.display();
+    let mend = format!("`sinew log repair {path}` gives it a proper end");
+    format!(
+        "{path}: {error}; the run goes on. {mend}; for the next run make room there, or name another folder by --out"
+    )
 }
 
 /// `agent.port` as a topic.
@@ -324,6 +343,20 @@ pub(crate) fn choice(ready: &Ready, images: f64) -> LogChoice {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_log_that_ended_is_told_with_its_place_and_what_mends_it() {
+        let full = std::io::Error::from_raw_os_error(28);
+        let said = ended(Path::new("/tmp/run.mcap"), &WriteError::Ended(full.into()));
+        for part in [
+            "/tmp/run.mcap: the log ends here: No space left",
+            "goes on",
+            "sinew log repair /tmp/run.mcap",
+            "--out",
+        ] {
+            assert!(said.contains(part), "{part}: {said}");
+        }
+    }
 
     #[test]
     fn outputs_become_topics() {
