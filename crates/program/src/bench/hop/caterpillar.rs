@@ -22,7 +22,7 @@ const SEGMENTS: usize = 8;
 const WORK: Work = Work {
     name: "caterpillar",
     theirs: "caterpillar_paced",
-    ratios: ["caterpillar/copper", "caterpillar_mean/copper", "caterpillar_p99/copper"],
+    ratios: ["caterpillar_median/copper", "caterpillar/copper", "caterpillar_p99/copper"],
     prefix: "caterpillar_",
     messages: 1.0 + SEGMENTS as f64,
 };

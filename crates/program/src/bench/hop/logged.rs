@@ -14,7 +14,7 @@ use crate::error::Failure;
 const WORK: Work = Work {
     name: "hop_logged",
     theirs: "hop_logged",
-    ratios: ["hop_logged/copper_logged", "hop_logged_mean/copper_logged", "hop_logged_p99/copper_logged"],
+    ratios: ["hop_logged_median/copper_logged", "hop_logged/copper_logged", "hop_logged_p99/copper_logged"],
     prefix: "",
     messages: 4.0,
 };
