@@ -135,25 +135,44 @@ impl Router {
             .filter(|(_, asker)| asker.told < version && !is_under_way(asker.telling))
             .map(|(asker, _)| *asker)
             .collect();
-        if !behind.is_empty() {
-            behind.into_iter().for_each(|asker| self.tell(asker, None));
-            self.advance(fabric);
+        if behind.is_empty() {
+            return;
+        }
+        // One script for each executor, however many agents it has.
+        let mut steps: BTreeMap<usize, (Vec<PortId>, Vec<Step>)> = BTreeMap::new();
+        for asker in behind {
+            if let Some(step) = self.telling_step(asker, None) {
+                let (askers, steps) = steps.entry(step.executor).or_default();
+                askers.push(asker);
+                steps.push(step);
+            }
+        }
+        for (askers, steps) in steps.into_values() {
+            self.tell(&askers, steps);
+        }
+        self.advance(fabric);
+    }
+
+    /// Tells agents of one executor.
+    fn tell(&mut self, askers: &[PortId], steps: Vec<Step>) {
+        let script = self.begin(steps);
+        for asker in askers {
+            if let Some(asker) = self.asking.askers.get_mut(asker) {
+                asker.telling = script;
+            }
         }
     }
 
-    /// Tells an agent what there is, and what became of a request.
-    fn tell(&mut self, asker: PortId, decision: Option<(u32, Decision)>) {
-        let Some(known) = self.agents.get(&asker.0) else { return };
+    /// What tells an agent what there is, and what became of a request.
+    fn telling_step(&mut self, asker: PortId, decision: Option<(u32, Decision)>) -> Option<Step> {
+        let known = self.agents.get(&asker.0)?;
         let (executor, slot, of) = (known.executor, known.slot, known.id);
-        let Some(known) = self.asking.askers.get_mut(&asker) else { return };
+        let known = self.asking.askers.get_mut(&asker)?;
         let composition = self.asking.composition.clone();
         let anew = core::mem::replace(&mut known.told, composition.version()) == 0;
         let told = Box::new(Told { composition: Some(composition), anew, decision });
         let change = Change::Tell { end: known.end.clone(), told, slot };
-        let script = self.begin(vec![Step { executor, of, ring: None, what: What::Change(change) }]);
-        if let Some(known) = self.asking.askers.get_mut(&asker) {
-            known.telling = script;
-        }
+        Some(Step { executor, of, ring: None, what: What::Change(change) })
     }
 
     /// Whether an agent has asked for something that is not decided yet.
@@ -187,7 +206,8 @@ impl Router {
                 };
                 let agent = self.by_id(asker.0).map_or_else(String::new, |known| known.plan.name.clone());
                 said.push(Said { agent, what: format!("asked the router: {what}{outcome}") });
-                self.tell(asker, Some((ask.ticket, decision)));
+                let step = self.telling_step(asker, Some((ask.ticket, decision)));
+                self.tell(&[asker], step.into_iter().collect());
                 self.advance(fabric);
                 if is_busy {
                     // An executor was waited for as long as there is patience. Others are served before the next request is.

@@ -197,13 +197,15 @@ fn who_goes_or_is_lost_with_requests_under_way_leaves_nothing() {
 fn what_is_looked_at_is_not_taken_away() {
     let mut world = world();
     let hand = world.hand("a");
+    let looked_at = Arc::downgrade(&world.router.asking.composition);
     let look = hand.router.system();
-    let version = look.version();
     world.ask(wire("b.go", "c.come")).unwrap();
-    assert_eq!((look.version(), look.wires().count()), (version, 0));
+    assert!(looked_at.upgrade().is_some());
+    assert_eq!(look.wires().count(), 0);
     drop(look);
     world.ask(Request::Wire(WirePlan::new("c.go", "b.come"))).unwrap();
     assert_eq!(hand.router.system().wires().count(), 2);
+    assert!(looked_at.upgrade().is_none());
 }
 
 #[test]
