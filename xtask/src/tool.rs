@@ -70,6 +70,14 @@ impl Tool {
         Ok((output.status.success(), String::from_utf8_lossy(&output.stderr).into_owned()))
     }
 
+    /// Runs it and takes what it writes; whether it ended well, standard output, and standard error.
+    pub(crate) fn heard(mut self) -> Result<(bool, String, String), Failure> {
+        let line = self.show();
+        let output = self.command.output().map_err(|error| cannot_start(&line, &error))?;
+        let text = |bytes: &[u8]| String::from_utf8_lossy(bytes).into_owned();
+        Ok((output.status.success(), text(&output.stdout), text(&output.stderr)))
+    }
+
     /// Like `output`, but any code but 0 is a failure.
     pub(crate) fn text(self, remedy: &str) -> Result<String, Failure> {
         let (line, output) = self.output()?;

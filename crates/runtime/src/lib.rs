@@ -80,6 +80,7 @@ mod log;
 mod memory;
 mod message_type;
 mod names;
+mod nonblocking;
 mod os;
 mod plan;
 mod port;

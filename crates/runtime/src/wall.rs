@@ -26,6 +26,7 @@ use crate::executor::{Core, Ended};
 use crate::handover::{Owner, Running};
 use crate::log::LogThread;
 use crate::names::Directory;
+use crate::nonblocking::RealTime;
 use crate::os;
 use crate::plan::{ExecutorPlan, Plan};
 use crate::processor::{Processors, Stopwatch};
@@ -537,17 +538,19 @@ fn run_core(
 ) {
     let core = cell.core.get();
     let mut woken = watch.wake();
+    let here = RealTime::enter(plan.priority.is_some());
     let mut sleep = |until| {
         watch.rest(&woken);
-        cell.door.sleep(until);
+        here.pause(|| cell.door.sleep(until));
         woken = watch.wake();
     };
+    let mine = || here.still(cell.owner.keeps(number));
     let mut at = watch.fresh(Time::ZERO);
     loop {
         // SAFETY: the core is this thread's own, and the borrow ends here.
         let changes = unsafe { (*core).look_at_door() };
         // SAFETY: the core is this thread's own; the last says whether it still is when somebody was stopped.
-        if changes && !unsafe { Core::serve_changes(core, context, at.time, &|| cell.owner.keeps(number)) } {
+        if changes && !unsafe { Core::serve_changes(core, context, at.time, &mine) } {
             return;
         }
         if changes || watch.is_old(&at) {
@@ -556,7 +559,6 @@ fn run_core(
         // SAFETY: as above, and the borrow ends before the step.
         let job = unsafe { (*core).next(at.time) };
         if let Some(job) = job {
-            let mine = || cell.owner.keeps(number);
             // SAFETY: the core is this thread's own; `mine` says whether it still is after the step.
             match unsafe { Core::run(core, context, job, &mut at, Some(watch), mine) } {
                 None => return,

@@ -8,6 +8,7 @@ mod lessons;
 mod live;
 mod log;
 mod new_agent;
+mod realtime;
 mod recorded;
 mod repeat;
 mod sanitize;
@@ -144,7 +145,7 @@ pub(crate) const ALL: [Step; 16] = [
 /// What takes long, or a compiler that not everybody has: only where it is named.
 pub(crate) const MORE: [Step; 1] = [Step {
     name: "sanitize",
-    shows: "no race between the threads of the runtime (by name only; needs a nightly compiler)",
+    shows: "no race between the threads of the runtime, and nothing that blocks on those in real time (by name only; needs a nightly compiler)",
     needs: &[Need::Compiler],
     run: sanitize::run,
 }];

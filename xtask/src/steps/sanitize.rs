@@ -1,9 +1,10 @@
-//! The threads of the runtime under ThreadSanitizer, which sees accesses to memory that no order makes safe.
+//! The threads of the runtime under ThreadSanitizer, which sees accesses to memory that no order makes safe; and those in real time under
+//! another one, see [`realtime`].
 
 use std::path::Path;
 
-use super::Done;
 use super::cargo::tests_run;
+use super::{Done, realtime};
 use crate::failure::Failure;
 use crate::tool::Tool;
 use crate::workspace::Workspace;
@@ -40,6 +41,9 @@ pub(super) fn run(workspace: &Workspace) -> Result<Done, Failure> {
             "sanitizers need a nightly compiler: rustup toolchain install nightly".to_owned(),
         ));
     }
+    // The quicker one first.
+    let blocked = realtime::run(workspace, &nightly)?;
+    println!("  {blocked} tests and a robot without a call that blocks in real time");
     let reports = workspace.fresh_scratch("sanitize")?;
     // Races are told when all is done: those that the standard library seems to have must not end a test.
     let options = format!("halt_on_error=0 exitcode=0 log_path={}", reports.join("race").display());
@@ -56,7 +60,10 @@ pub(super) fn run(workspace: &Workspace) -> Result<Done, Failure> {
         all(&reports).map_err(|error| Failure::new(format!("{}: {error}", reports.display()), REMEDY))?;
     let races = races(&text);
     if races.is_empty() {
-        return Ok(Done::Passed(format!("{ran} tests without a race")));
+        let what = format!(
+            "{ran} tests without a race, {blocked} and a robot without a call that blocks in real time"
+        );
+        return Ok(Done::Passed(what));
     }
     Err(Failure::new(format!("races, told in {}:\n{}", reports.display(), races.join("\n")), REMEDY))
 }

@@ -3,6 +3,8 @@
 #![allow(clippy::unwrap_used)] // a test may
 
 mod asking;
+#[cfg(rtsan)]
+mod blocking;
 mod calls;
 mod cuts;
 mod deaths;
