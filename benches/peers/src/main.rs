@@ -58,7 +58,7 @@ fn main() -> ExitCode {
             return ExitCode::SUCCESS;
         }
         ["list"] => {
-            measurements::ALL.iter().for_each(|one| println!("{:<12} {}", one.name, one.what));
+            measurements::ALL.iter().for_each(|one| println!("{:<18} {}", one.name, one.what));
             return ExitCode::SUCCESS;
         }
         ["list", "--json"] => {

@@ -74,7 +74,7 @@ pub(crate) const ALL: &[Measurement] = &[
     #[cfg(feature = "iceoryx2")]
     Measurement {
         name: "iceoryx2",
-        what: "loan and send of 64 bytes and of 230 400, one way between two threads that poll",
+        what: "64 bytes and 230 400, sent and received in one thread, and one way between two threads that poll",
         peer: crate::iceoryx2::PEER,
         figures: crate::iceoryx2::FIGURES,
         measure: crate::iceoryx2::measure,

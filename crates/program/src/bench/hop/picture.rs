@@ -150,7 +150,7 @@ fn hops(pictures: bool, messages: usize, outcome: &mut Outcome) -> Result<Vec<f6
 /// Rounds of both and of iceoryx2, in turns.
 pub(super) fn measure(setting: &Setting<'_>, outcome: &mut Outcome) -> Result<(), Failure> {
     let messages = setting.of(MESSAGES, 500);
-    let mut turns = [(); 2].map(|()| Turns::new(setting.peers.clone()));
+    let mut turns = Turns::new(setting.peers.clone());
     let args = ["--iterations".to_owned(), messages.to_string(), "--cpu".to_owned(), format!("{CPU},1")];
     let (mut small, mut large, mut rounds) = (Vec::new(), Vec::new(), Vec::new());
     let mut beside = [(); 2].map(|()| Beside::default());
@@ -161,9 +161,9 @@ pub(super) fn measure(setting: &Setting<'_>, outcome: &mut Outcome) -> Result<()
         rounds.push((ours[1], ours[0]));
         small.extend(few);
         large.extend(many);
-        let mut round = turns[0].round("iceoryx2", &args);
+        let mut round = turns.round("iceoryx2", &args);
         for (which, figure) in ["hop_64", "hop_230400"].into_iter().enumerate() {
-            let theirs = turns[which].take(&mut round, figure, "ns");
+            let theirs = turns.take(&mut round, figure, "ns");
             if !theirs.is_empty() {
                 beside[which].rounds.push((ours[which], median(theirs.clone())));
                 beside[which].theirs.extend(theirs);
@@ -174,9 +174,14 @@ pub(super) fn measure(setting: &Setting<'_>, outcome: &mut Outcome) -> Result<()
     outcome.figure("picture", "ns", large);
     outcome.compare("picture/hop64", rounds);
     let names = [("hop64_iceoryx2", "hop64/iceoryx2"), ("picture_iceoryx2", "picture/iceoryx2")];
-    for ((turns, beside), (figure, ratio)) in turns.into_iter().zip(beside).zip(names) {
+    let failure = turns.failure();
+    for (beside, (figure, ratio)) in beside.into_iter().zip(names) {
         outcome.figure(figure, "ns", beside.theirs);
-        turns.compare(outcome, ratio, beside.rounds);
+        if failure.is_some() || beside.rounds.is_empty() {
+            outcome.without(ratio, failure.clone());
+        } else {
+            outcome.compare(ratio, beside.rounds);
+        }
     }
     Ok(())
 }
