@@ -180,6 +180,40 @@ impl Answer {
     }
 }
 
+/// Who wishes to drive hears how fast is safe, too, and obeys at once. One who does not for so long does not listen, or says the same
+/// again and again.
+const HEEDLESS: Duration = Duration::secs(1);
+/// For so long it must then have obeyed before it is heard again.
+const OBEYS: Duration = Duration::secs(5);
+
+/// Whether the wishes of the coordinator obey the safety monitor.
+#[derive(Clone, Copy, Debug, Default)]
+struct Heed {
+    /// Since when each was faster than is safe.
+    faster: Option<Time>,
+    /// When one was that for too long last.
+    broken: Option<Time>,
+}
+
+impl Heed {
+    /// Whether a wish is heard while it is safe to go as fast as `safe` (m/s).
+    fn hears(&mut self, wish: Twist, safe: f64, now: Time) -> bool {
+        if wish.linear > safe {
+            let since = *self.faster.get_or_insert(now);
+            if now - since > HEEDLESS || self.broken.is_some() {
+                if self.broken.is_none() {
+                    runtime::note!("the wishes go on to be faster than is safe: they are not heard");
+                }
+                self.broken = Some(now);
+            }
+        } else {
+            self.faster = None;
+            self.broken = self.broken.filter(|broken| now - *broken <= OBEYS);
+        }
+        self.broken.is_none()
+    }
+}
+
 /// The longest time between two steps that the limits of acceleration are granted at once (s).
 const LONGEST_STEP: f64 = 0.1;
 
@@ -192,6 +226,7 @@ struct Hands {
     reflex: Option<Dated<Twist>>,
     motion: Option<Twist>,
     answer: Answer,
+    heed: Heed,
     commanded: Twist,
     cuts: Cuts,
     last: Option<Time>,
@@ -228,7 +263,9 @@ impl Hands {
         match fused.cause {
             Cause::Offers | Cause::Stop => fused.twist,
             Cause::Held | Cause::Silence => {
-                Dated::fresh(&self.wish, now, params.wish_age).unwrap_or(Twist::ZERO)
+                let wish = Dated::fresh(&self.wish, now, params.wish_age).unwrap_or(Twist::ZERO);
+                let safe = if veto.forward { veto.linear_max } else { 0.0 };
+                if self.heed.hears(wish, safe, now) { wish } else { Twist::ZERO }
             }
         }
     }
@@ -315,6 +352,25 @@ mod tests {
         assert!(after(hands, true).linear < 0.21, "safety was not heard");
         hands.safety = dated(Safety { linear_max: 0.25, ..Safety::default() });
         assert!((after(hands, true).linear - 0.25).abs() < 1e-12);
+    }
+
+    #[test]
+    fn wishes_that_do_not_obey_safety_are_not_heard_until_they_have_obeyed_for_long() {
+        let params = DriveParams::default();
+        let mut hands = Hands::default();
+        let mut speed = |millis: i64, wish: f64, safe: f64| {
+            hands.wish = Some(Dated { value: Twist::new(wish, 0.0), stamp: at(millis) });
+            hands.safety =
+                Some(Dated { value: Safety { linear_max: safe, ..Safety::default() }, stamp: at(millis) });
+            hands.command(&params, true, at(millis)).linear
+        };
+        let mut last = |from: i64, to: i64, wish, safe| {
+            (from / 50..to / 50).map(|i| speed(50 * i, wish, safe)).last().unwrap()
+        };
+        assert_eq!(last(0, 1000, 0.4, 0.1), 0.1, "slowed, and perhaps a little late");
+        assert_eq!(last(1000, 1500, 0.4, 0.1), 0.0);
+        assert_eq!(last(1500, 3000, 0.4, 0.6), 0.0, "that it is safe now makes it no better");
+        assert!(last(3000, 9000, 0.4, 0.6) > 0.39);
     }
 
     #[test]

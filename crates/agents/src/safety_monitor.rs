@@ -12,7 +12,7 @@ use types::messages::{Drive, Odometry, Offer, Ranges, Safety, Twist};
 use types::params::Params;
 use types::{Duration, Point, Pose, Time};
 
-use crate::shared::{Dated, echoes, ring};
+use crate::shared::{Dated, bearings, echoes, ring};
 use crate::trust::{Doubt, Trust};
 
 /// What the robot is, and how careful it shall be.
@@ -156,6 +156,7 @@ fn note(doubt: Option<Doubt>) {
         None => runtime::note!("blind: no ranges that can be trusted"),
         Some(Doubt::Silent) => runtime::note!("blind: nothing is heard of the wheels"),
         Some(Doubt::Jumps) => runtime::note!("blind: the wheels tell of a motion that cannot be"),
+        Some(Doubt::Stays) => runtime::note!("blind: the wheels tell of a motion that leads nowhere"),
         Some(Doubt::Frozen) => runtime::note!("blind: the ranges stay the same while the robot moves"),
     }
 }
@@ -170,6 +171,8 @@ const IN_FRONT: f64 = 0.7;
 /// What is nearer to straight ahead than this comes nearer still (rad): 65°. To what is farther off, a robot that goes straight on comes
 /// nearer by 9 % of its distance from the middle of the body, which is 4 cm of what is touched.
 const OBLIQUE: f64 = 1.13;
+/// What is farther from the rim than this is afar (m): of false echoes from between here and there one in fifty is as near as a touch.
+const AFAR: f64 = 1.0;
 /// What is farther from straight ahead than this is left behind (rad): 110°.
 const BESIDE: f64 = 0.6 * PI;
 /// A turn at this rate is one (rad/s), not the noise of a controller.
@@ -243,7 +246,7 @@ impl Watch {
                 (verdict.nearest, verdict.nearest_bearing) = (remembered.nearest, remembered.nearest_bearing);
             }
         }
-        self.touch(params, &filtered, &mut verdict);
+        self.touch(params, &raw, &filtered, &mut verdict);
         let offer = self.avoid(params, &mut verdict, now);
         let nothing_heard =
             [ring(&raw), ring(&filtered)].iter().all(|ring: &Ring<'_>| ring.echoes().next().is_none());
@@ -280,8 +283,9 @@ impl Watch {
     }
 
     /// With something obliquely ahead as near as can be told it creeps, and past it, beside it, it goes slowly; with that in front it may
-    /// be nearer than told, and it stands.
-    fn touch(&self, params: &SafetyParams, filtered: &Ranges, verdict: &mut Verdict) {
+    /// be nearer than told, and it stands. An echo from there that the filter does not yet believe is believed where the last one came
+    /// from afar: a false one seldom falls just there, and a smooth thing that was silent until now may be silent again.
+    fn touch(&self, params: &SafetyParams, raw: &Ranges, filtered: &Ranges, verdict: &mut Verdict) {
         let close = f64::from(filtered.range_min).max(params.radius + params.touch);
         if echoes(filtered).any(|(bearing, range)| range <= close && wrap(bearing).abs() < IN_FRONT) {
             (verdict.forward, verdict.linear_max) = (false, 0.0);
@@ -289,7 +293,10 @@ impl Watch {
         let touched = |(bearing, range): (f64, f64)| {
             range - params.radius <= params.touch && wrap(bearing).abs() <= OBLIQUE
         };
-        if echoes(filtered).any(touched) || self.points.iter().copied().any(touched) {
+        let afar =
+            |i: usize| filtered.values.get(i).is_none_or(|range| f64::from(*range) > params.radius + AFAR);
+        let appeared = (0..).zip(bearings(raw)).filter(|(i, _)| afar(*i)).map(|(_, echo)| echo);
+        if echoes(filtered).chain(appeared).chain(self.points.iter().copied()).any(touched) {
             verdict.linear_max = verdict.linear_max.min(params.creep);
         } else if verdict.nearest <= params.touch && verdict.nearest_bearing.abs() <= BESIDE {
             verdict.linear_max = verdict.linear_max.min(params.pass);
@@ -438,6 +445,21 @@ mod tests {
         assert_eq!([2, 3, 4].map(|beam| close(beam, 0.375)), [0.1, 0.35, 0.6]);
         assert_eq!([10, 9, 8].map(|beam| close(beam, 0.375)), [0.1, 0.35, 0.6]);
         assert_eq!([2, 3].map(|beam| close(beam, 0.45)), [0.6, 0.6]);
+    }
+
+    #[test]
+    fn what_appears_close_obliquely_ahead_out_of_silence_is_believed_at_once() {
+        let params = SafetyParams::default();
+        // At 60°, where the filter still has silence, or something half a metre from the rim, of which near echoes may be false.
+        let fastest = |filtered: f32| {
+            let mut ranges = around(4.0, 4.0, 4.0);
+            ranges.values[2] = filtered;
+            let mut watch = watch(ranges);
+            ranges.values[2] = 0.375;
+            watch.raw = Some(Dated { value: ranges, stamp: Time::ZERO });
+            watch.judge(&params, Time::ZERO).0.linear_max
+        };
+        assert_eq!([6.2, 4.0, 0.7].map(fastest), [params.creep, params.creep, 0.6]);
     }
 
     #[test]

@@ -22,9 +22,13 @@ pub(crate) fn ring(ranges: &Ranges) -> Ring<'_> {
 /// Bearing (rad) and distance from the robot's centre (m) of what was heard. Silence is no echo.
 pub(crate) fn echoes(ranges: &Ranges) -> impl Iterator<Item = (f64, f64)> + Clone + '_ {
     let silent = f64::from(ranges.range_max);
+    bearings(ranges).filter(move |(_, range)| *range < silent)
+}
+
+/// Bearing (rad) and distance from the robot's centre (m) in each direction, silence among them.
+pub(crate) fn bearings(ranges: &Ranges) -> impl Iterator<Item = (f64, f64)> + Clone + '_ {
     let bearing = move |i: usize| f64::from(ranges.angle_min) + i as f64 * f64::from(ranges.angle_step);
-    let row = ranges.values.iter().enumerate();
-    row.map(move |(i, range)| (bearing(i), f64::from(*range))).filter(move |(_, range)| *range < silent)
+    ranges.values.iter().enumerate().map(move |(i, range)| (bearing(i), f64::from(*range)))
 }
 
 /// Ranges in `directions` around the robot, the first straight ahead, of which nothing is known yet.

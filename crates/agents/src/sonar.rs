@@ -14,7 +14,7 @@ use types::params::Params;
 use types::{Sequence, Time, geometry::TAU};
 
 use crate::shared::{Before, blank};
-use crate::trust::can_be;
+use crate::trust::{Mounts, can_be};
 
 /// How echoes are filtered and when a direction is risky.
 #[derive(Clone, Debug, Params)]
@@ -80,6 +80,7 @@ pub struct Sonar {
     risk: Output<Risk>,
     params: SonarParams,
     chain: Chain,
+    mounts: Mounts,
     /// Whether the last ring could not be true.
     doubted: bool,
 }
@@ -89,7 +90,7 @@ impl Agent for Sonar {
         let Some(received) = self.echoes.newest() else { return Ok(()) };
         let stamp = received.header().stamp;
         let envelope = Envelope { stamp: Some(stamp), ..Envelope::default() };
-        if !can_be(&received) {
+        if !can_be(&received) || !self.mounts.are_where_they_were(&received) {
             if !std::mem::replace(&mut self.doubted, true) {
                 runtime::note!("the ring of sonars says what cannot be; it is not listened to");
             }

@@ -4,10 +4,11 @@
 //! |---|---|
 //! | a number that is none, or a place metres from the last | no wheels drive like that |
 //! | nothing from the wheels for some time | they were heard before |
+//! | a velocity, and always the same place | who moves comes away |
 //! | the same echoes to the last digit, elsewhere | a sensor that moves hears something else, if only its noise |
 
 use types::messages::{Echoes, Odometry, Ranges};
-use types::{Duration, Pose, Time};
+use types::{Duration, Pose, Sequence, Time};
 
 use crate::shared::{Dated, echoes};
 
@@ -18,6 +19,8 @@ pub(crate) enum Doubt {
     Silent,
     /// Odometry tells of motions that nothing on wheels can make.
     Jumps,
+    /// Odometry tells of a motion and of no other place.
+    Stays,
     /// The ranges stay the same while the robot moves.
     Frozen,
 }
@@ -30,6 +33,9 @@ const DOUBTED: Duration = Duration::millis(600);
 const FASTEST: (f64, f64) = (20.0, 20.0);
 /// How far a place may be from where the velocity leads (m): slip, and the noise of the wheels.
 const SLIP: f64 = 0.1;
+/// Who should have come so far (m, rad) by its velocity and has not come away at all is told the same again and again: five readings of
+/// wheels at 50 Hz at a slow walk.
+const COME: (f64, f64) = (0.03, 0.1);
 /// Farther than this (m, rad) from where they were heard first, the same echoes cannot be true.
 const ELSEWHERE: (f64, f64) = (0.06, 0.1);
 /// Fewer echoes than this can be the same by chance.
@@ -41,6 +47,8 @@ pub(crate) struct Trust {
     odometry: Option<Dated<Odometry>>,
     /// When it last told of what cannot be.
     jumped: Option<Time>,
+    /// How far it should have come (m, rad) since it told of another place.
+    stays: (f64, f64),
     rings: [Again; 2],
 }
 
@@ -65,6 +73,14 @@ impl Trust {
             && before.is_none_or(|before| leads(&before, odometry, stamp));
         if !is_possible {
             self.jumped = Some(now);
+        }
+        match before.filter(|before| is_possible && before.value.pose == odometry.pose) {
+            Some(before) => {
+                let span = (stamp - before.stamp).seconds().max(0.0);
+                self.stays.0 += twist.linear.abs() * span;
+                self.stays.1 += twist.angular.abs() * span;
+            }
+            None => self.stays = (0.0, 0.0),
         }
         is_possible
     }
@@ -91,6 +107,8 @@ impl Trust {
             Some(Doubt::Jumps)
         } else if self.odometry.as_ref().is_some_and(|heard| now - heard.stamp > SILENT) {
             Some(Doubt::Silent)
+        } else if self.stays.0 > COME.0 || self.stays.1 > COME.1 {
+            Some(Doubt::Stays)
         } else {
             self.rings.iter().any(|ring| ring.frozen).then_some(Doubt::Frozen)
         }
@@ -136,6 +154,18 @@ pub(crate) fn can_be(ring: &Echoes) -> bool {
             .all(|echo| sits(echo.x) && sits(echo.y) && sits(echo.bearing) && hears(echo.range))
 }
 
+/// Where the transducers of a ring sat, which does not change while it is listened to.
+#[derive(Clone, Copy, Debug, Default)]
+pub(crate) struct Mounts(Option<Sequence<[f32; 3], 32>>);
+
+impl Mounts {
+    /// Whether those of this ring sit where they sat in the ring before.
+    pub(crate) fn are_where_they_were(&mut self, ring: &Echoes) -> bool {
+        let mounts = ring.echoes.iter().map(|echo| [echo.x, echo.y, echo.bearing]).collect();
+        self.0.replace(mounts).is_none_or(|before| before == mounts)
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -166,6 +196,37 @@ mod tests {
         for wild in [at(f64::NAN, 0.0), at(0.0, f64::INFINITY), at(3.0, -1e6)] {
             assert!(!trust.hear(&wild, ms(2000), ms(2000)), "{wild:?}");
         }
+    }
+
+    #[test]
+    fn a_motion_that_leads_nowhere_is_not_believed() {
+        let mut trust = Trust::default();
+        let mut hear = |ms_: i64, x: f64, speed: f64| {
+            trust.hear(&at(x, speed), ms(ms_), ms(ms_));
+            trust.doubt(ms(ms_))
+        };
+        let stuck: Vec<_> = (0..10).map(|i| hear(20 * i, 1.0, 0.3)).collect();
+        assert_eq!(stuck[5], None, "30 mm in 100 ms are no more than that");
+        assert_eq!(stuck[6], Some(Doubt::Stays));
+        assert_eq!(hear(220, 1.001, 0.3), None, "it comes away");
+        assert!((0..500).all(|i| hear(240 + 20 * i, 1.001, 0.0).is_none()), "at rest it stays");
+        let mut turning = Trust::default();
+        let spin = Odometry { twist: Twist::new(0.0, 1.0), ..Odometry::default() };
+        assert!((0..10).all(|i| turning.hear(&spin, ms(20 * i), ms(20 * i))));
+        assert_eq!(turning.doubt(ms(180)), Some(Doubt::Stays));
+    }
+
+    #[test]
+    fn transducers_sit_where_they_sat() {
+        let echo = |bearing| Echo { x: 0.2, y: 0.0, bearing, range: 1.0 };
+        let ring = |bearing, range| Echoes {
+            echoes: [Echo { range, ..echo(bearing) }; 4].into_iter().collect(),
+            ..Echoes::default()
+        };
+        let mut mounts = Mounts::default();
+        let heard = [(0.5, 1.0), (0.5, 2.0), (0.6, 2.0), (0.7, 2.0), (0.5, 2.0), (0.5, 1.0)];
+        let believed = heard.map(|(bearing, range)| mounts.are_where_they_were(&ring(bearing, range)));
+        assert_eq!(believed, [true, true, false, false, false, true]);
     }
 
     #[test]

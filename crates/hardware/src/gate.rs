@@ -49,6 +49,8 @@ pub struct Counts {
     pub overruled: Count,
     /// Cycles in which something of a command was cut.
     pub clamped: Count,
+    /// Cycles in which a command was followed more slowly, because it was faster than is safe.
+    pub slowed: Count,
     /// Times that the bumper was pressed.
     pub bumps: Count,
     /// Times that the gate saw the latch set after it was clear.
@@ -76,6 +78,8 @@ pub enum Event {
     Stale,
     /// A command was cut for the first time since one passed whole.
     Clamped(Cuts),
+    /// A command wanted to go forward faster than is safe, for the first time since one did not.
+    Slowed,
 }
 
 /// So many commands that are no numbers, within so long, come from somebody who is broken: what else they command is as wrong, though
@@ -99,6 +103,10 @@ impl Nonsense {
         self.count >= NONSENSE.0
     }
 }
+
+/// Whoever commands for the robot hears how fast is safe and obeys within a few hundredths of a second. One who does not for so long does
+/// not listen, or says the same again and again: what else it commands is as wrong, though it looks right.
+const HEEDLESS: Duration = Duration::secs(1);
 
 /// What one cycle did.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -126,6 +134,8 @@ pub struct Gate {
     /// When the latch was last found set. Nothing that was commanded up to then moves the head.
     barrier: Option<Time>,
     was_cut: bool,
+    /// Whose commands had to be slowed in each cycle, and since when.
+    slowed: Option<(Authority, Time)>,
     nonsense: Nonsense,
     last_seen: Time,
 }
@@ -151,6 +161,7 @@ impl Gate {
             resets,
             barrier: None,
             was_cut: false,
+            slowed: None,
             nonsense: Nonsense::default(),
             last_seen: Time::ZERO,
         }
@@ -231,6 +242,13 @@ impl Gate {
         }
     }
 
+    /// Takes the word of somebody who is not the one who commands: how fast it was safe to go forward at `stamp` (m/s).
+    pub fn allow(&mut self, now: Time, stamp: Time, linear_max: f64) {
+        if let Some(guard) = &mut self.guard {
+            guard.allow(now, stamp, linear_max);
+        }
+    }
+
     /// Turns the head by a command that was made at `stamp`, unless the latch is set or was set after that, there is none, or the
     /// command is not finite.
     ///
@@ -280,7 +298,7 @@ impl Gate {
         };
         let contact = Contact::of(self.pressed, self.driver.describe().bumper_sectors);
         let verdict = guard.decide(now, latch, contact);
-        let event = event.or_else(|| self.look_at(verdict.reason));
+        let event = event.or_else(|| self.look_at(now, verdict.reason));
         self.driver.drive(&Permit(()), now, verdict.twist).inspect_err(|_| {
             self.counts.failures.add();
             self.latch.set(Cause::Hardware, now);
@@ -312,8 +330,19 @@ impl Gate {
         Some(if is_set { Event::LatchSet } else { Event::LatchCleared })
     }
 
-    fn look_at(&mut self, reason: Reason) -> Option<Event> {
+    fn look_at(&mut self, now: Time, reason: Reason) -> Option<Event> {
+        let before = self.slowed.take();
         match reason {
+            Reason::Slowed(authority) => {
+                self.counts.slowed.add();
+                let of_the_same = before.filter(|(before, _)| *before == authority);
+                let (_, since) = *self.slowed.insert(of_the_same.unwrap_or((authority, now)));
+                // A person may push on against it for as long as he likes.
+                if authority == Authority::Robot && now - since > HEEDLESS {
+                    self.latch.set(Cause::Heedless, now);
+                }
+                before.is_none().then_some(Event::Slowed)
+            }
             Reason::Stale => {
                 self.counts.stale.add();
                 Some(Event::Stale)

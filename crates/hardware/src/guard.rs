@@ -39,11 +39,25 @@ pub struct Policy {
     pub linear_max: f64,
     /// No faster turns than this (rad/s). Infinite: as fast as the robot can.
     pub angular_max: f64,
+    /// Whether somebody who is not the one who commands says how fast is safe. Then nobody goes forward faster, and without a fresh word
+    /// of it nobody goes forward at all.
+    pub guarded: bool,
+    /// Such a word older than this allows nothing. 700 ms is two missed readings of a sonar at 4 Hz.
+    pub safety_age: Duration,
+    /// How fast the speed falls to what is safe (m/s²). 1 does not tip a tall body.
+    pub braking: f64,
 }
 
 impl Default for Policy {
     fn default() -> Policy {
-        Policy { age_limit: Duration::millis(300), linear_max: f64::INFINITY, angular_max: f64::INFINITY }
+        Policy {
+            age_limit: Duration::millis(300),
+            linear_max: f64::INFINITY,
+            angular_max: f64::INFINITY,
+            guarded: false,
+            safety_age: Duration::millis(700),
+            braking: 1.0,
+        }
     }
 }
 
@@ -98,6 +112,8 @@ pub enum Reason {
     Stale,
     /// A command is followed; what was cut of it.
     Followed(Authority, Cuts),
+    /// A command is followed, more slowly: it wanted to go forward faster than is safe.
+    Slowed(Authority),
 }
 
 /// A decision.
@@ -119,10 +135,13 @@ struct Held {
 /// The rules of a gate.
 ///
 /// ```text
-///   offer ──▶ one place per authority ──▶ latch? ──▶ age? ──▶ contact? ──▶ limits ──▶ wheels
-///                                          zero      next     no way        cut
+///   offer ──▶ one place per authority ──▶ latch? ──▶ age? ──▶ contact? ──▶ limits ──▶ safe? ──▶ wheels
+///                                          zero      next     no way        cut       slower
 ///                                                  authority  there
 /// ```
+///
+/// What is safe comes past all who command ([`allow`](Self::allow)), so nothing that goes wrong with them reaches a wall: a command that is
+/// said again and again is fresh, finite and within all limits, and still wrong.
 ///
 /// Nothing in it allocates, waits, or reads a clock.
 #[derive(Clone, Debug)]
@@ -139,7 +158,32 @@ pub struct Guard {
     /// What was decided before this instant, and how long before: several decisions at one instant replace each other.
     before: Twist,
     since: Duration,
+    safe: Safe,
 }
+
+/// How fast is safe.
+#[derive(Clone, Copy, Debug, Default)]
+struct Safe {
+    /// The last word of it (m/s), and of when it is.
+    said: Option<(f64, Time)>,
+    /// What counted of it last (m/s).
+    speed: f64,
+    fall: Option<Fall>,
+}
+
+/// It has become less, and the robot may still be faster.
+#[derive(Clone, Copy, Debug)]
+struct Fall {
+    since: Time,
+    /// How fast was safe before (m/s).
+    from: f64,
+    /// How fast the robot was at most when it heard of it (m/s).
+    fastest: f64,
+}
+
+/// For so long whoever commands may be behind what is safe: two periods of a drive at 50 Hz. It should be the one who brakes, as it keeps
+/// the robot on its path.
+const GRACE: Duration = Duration::millis(40);
 
 /// The time that a change may have taken where nobody knows it: at the first decision, and when the clock was turned back.
 const USUAL_STEP: Duration = Duration::millis(10);
@@ -159,6 +203,7 @@ impl Guard {
             decided: None,
             before: Twist::ZERO,
             since: USUAL_STEP,
+            safe: Safe::default(),
         }
     }
 
@@ -195,6 +240,13 @@ impl Guard {
         if finite { Ok(()) } else { Err(Refusal::NotFinite) }
     }
 
+    /// Takes the word of somebody who is not the one who commands: at `stamp` it was safe to go forward as fast as `linear_max` (m/s). It
+    /// can only slow or stop, and counts while the policy says that the robot is guarded. What is no number allows nothing.
+    pub fn allow(&mut self, now: Time, stamp: Time, linear_max: f64) {
+        self.safe.said =
+            Some((if linear_max.is_finite() { linear_max.max(0.0) } else { 0.0 }, stamp.min(now)));
+    }
+
     /// Whether a command of this authority would be followed, or a higher one stands in its way.
     pub fn is_overruled(&self, authority: Authority) -> bool {
         self.held[authority as usize + 1..].iter().any(Option::is_some)
@@ -211,6 +263,7 @@ impl Guard {
         if latch.is_set() {
             return self.stand(Reason::Latched);
         }
+        let safe = self.safe_speed(now);
         let mut gone_stale = false;
         for authority in [Authority::Referee, Authority::Person, Authority::Robot] {
             let Some(held) = self.held[authority as usize] else { continue };
@@ -221,7 +274,7 @@ impl Guard {
                 continue;
             }
             return match held.twist {
-                Some(twist) => self.follow(authority, twist, contact),
+                Some(twist) => self.follow(authority, twist, contact, safe),
                 None => self.stand(Reason::Followed(authority, Cuts { not_finite: true, ..Cuts::default() })),
             };
         }
@@ -234,7 +287,7 @@ impl Guard {
         Verdict { twist: Twist::ZERO, reason }
     }
 
-    fn follow(&mut self, authority: Authority, wanted: Twist, contact: Contact) -> Verdict {
+    fn follow(&mut self, authority: Authority, wanted: Twist, contact: Contact, safe: f64) -> Verdict {
         let mut limits = self.limits;
         limits.linear_max = limits.linear_max.min(self.policy.linear_max);
         limits.backward_max = limits.backward_max.min(self.policy.linear_max);
@@ -245,8 +298,39 @@ impl Guard {
             limited.twist.linear = 0.0;
             limited.cuts.forward = true;
         }
+        let mut reason = Reason::Followed(authority, limited.cuts);
+        if limited.twist.linear > safe {
+            // Slower on the same path; a stop ends the turn as well.
+            limited.twist = motion::kinematics::scaled(limited.twist, safe / limited.twist.linear);
+            reason = Reason::Slowed(authority);
+        }
         self.last = limited.twist;
-        Verdict { twist: limited.twist, reason: Reason::Followed(authority, limited.cuts) }
+        Verdict { twist: limited.twist, reason }
+    }
+
+    /// How fast it may go forward (m/s): as fast as is safe, and while it is faster than that, as fast as braking leaves it.
+    fn safe_speed(&mut self, now: Time) -> f64 {
+        if !self.policy.guarded {
+            self.safe.speed = f64::INFINITY;
+            return f64::INFINITY;
+        }
+        let is_fresh = |stamp: Time| (Duration::ZERO..=self.policy.safety_age).contains(&(now - stamp));
+        let safe = self.safe.said.filter(|(_, stamp)| is_fresh(*stamp)).map_or(0.0, |(speed, _)| speed);
+        let from = std::mem::replace(&mut self.safe.speed, safe);
+        if safe < from && self.safe.fall.is_none() {
+            self.safe.fall = Some(Fall { since: now, from, fastest: self.before.linear });
+        }
+        let Some(fall) = &mut self.safe.fall else { return safe };
+        let late = now - fall.since - GRACE;
+        if late <= Duration::ZERO {
+            fall.fastest = fall.fastest.max(self.last.linear);
+            return safe.max(fall.from);
+        }
+        let braked = fall.fastest - self.policy.braking * late.seconds();
+        if self.before.linear <= safe {
+            self.safe.fall = None;
+        }
+        safe.max(braked)
     }
 
     /// A command is fresh for as long as the limit says. One from the future is not: the clock has been turned back.
@@ -408,6 +492,88 @@ mod tests {
         let (mut guard, latch) = (brisk(), Latch::private());
         guard.offer(ms(5000), latch.state(), Authority::Robot, ms(5000), AHEAD).unwrap();
         assert_eq!(guard.decide(ms(1000), latch.state(), Contact::default()).twist, Twist::ZERO);
+    }
+
+    fn guarded() -> Guard {
+        let mut guard = brisk();
+        guard.set_policy(Policy { guarded: true, ..Policy::default() });
+        guard
+    }
+
+    /// What comes of a command that is said every 10 ms, from `from` to `to`; `said` is how fast is safe at each.
+    fn stuck(
+        guard: &mut Guard,
+        from: i64,
+        to: i64,
+        twist: Twist,
+        said: impl Fn(i64) -> Option<f64>,
+    ) -> Vec<Twist> {
+        let latch = Latch::private();
+        let mut decide = |t: i64| {
+            if let Some(safe) = said(t) {
+                guard.allow(ms(t), ms(t), safe);
+            }
+            guard.offer(ms(t), latch.state(), Authority::Robot, ms(t), twist).unwrap();
+            guard.decide(ms(t), latch.state(), Contact::default()).twist
+        };
+        (from / 10..=to / 10).map(|cycle| decide(10 * cycle)).collect()
+    }
+
+    #[test]
+    fn a_command_that_is_said_again_and_again_goes_no_faster_than_is_safe() {
+        let mut guard = guarded();
+        let curve = Twist::new(0.5, 0.25);
+        assert_eq!(stuck(&mut guard, 0, 200, curve, |_| Some(0.6)).last(), Some(&curve));
+        let braking = stuck(&mut guard, 210, 800, curve, |_| Some(0.1));
+        // Two periods of a drive are granted, then it brakes at 1 m/s² on its curve.
+        assert_eq!(braking[4], curve);
+        assert!(braking.windows(2).all(|pair| pair[0].linear - pair[1].linear < 0.0100001), "{braking:?}");
+        let slow = braking.last().unwrap();
+        assert!((slow.linear - 0.1).abs() < 1e-12 && (slow.angular - 0.05).abs() < 1e-12, "{slow:?}");
+        assert_eq!(stuck(&mut guard, 810, 1200, curve, |_| Some(0.0)).last(), Some(&Twist::ZERO));
+        assert_eq!(
+            guard.decide(ms(1200), Latch::private().state(), Contact::default()).reason,
+            Reason::Slowed(Authority::Robot)
+        );
+        assert_eq!(
+            stuck(&mut guard, 1210, 1300, Twist::new(0.0, 0.5), |_| Some(0.0))[0].angular,
+            0.5,
+            "a turn"
+        );
+        assert_eq!(stuck(&mut guard, 1310, 1400, Twist::new(-0.2, 0.0), |_| Some(0.0))[0].linear, -0.2);
+        assert_eq!(stuck(&mut guard, 1410, 1500, curve, |_| Some(f64::NAN)).last(), Some(&Twist::ZERO));
+    }
+
+    #[test]
+    fn a_guarded_robot_does_not_go_forward_when_nobody_says_how_fast_is_safe() {
+        let mut guard = guarded();
+        assert_eq!(stuck(&mut guard, 0, 100, AHEAD, |_| None).last(), Some(&Twist::ZERO), "not yet");
+        let heard = stuck(&mut guard, 110, 2000, AHEAD, |t| (t <= 200).then_some(0.6));
+        let at = |t: i64| heard[(t as usize - 110) / 10].linear;
+        assert_eq!((at(200), at(900), at(940)), (0.3, 0.3, 0.3));
+        assert!(at(1000) < 0.3 && at(1250) == 0.0, "{heard:?}");
+        guard.set_policy(Policy::default());
+        assert_eq!(stuck(&mut guard, 2010, 2100, AHEAD, |_| None).last(), Some(&AHEAD), "cut off from it");
+    }
+
+    #[test]
+    fn a_drive_that_brakes_as_it_should_is_never_slowed() {
+        let (mut guard, latch) = (guarded(), Latch::private());
+        let mut speed = 0.0f64;
+        let safe = |t: i64| [0.6, 0.35, 0.1, 0.6, 0.0][(t / 700 % 5) as usize];
+        for t in (0..7000).step_by(10) {
+            // The drive steps every 20 ms, at the same instant before the new word comes.
+            if t % 20 == 0 {
+                let heard = safe((t - 20).max(0));
+                speed = if speed > heard { (speed - 0.02).max(heard) } else { (speed + 0.01).min(heard) };
+                guard.offer(ms(t), latch.state(), Authority::Robot, ms(t), Twist::new(speed, 0.1)).unwrap();
+            }
+            for said in [safe((t - 10).max(0)), safe(t)] {
+                guard.allow(ms(t), ms(t), said);
+                let verdict = guard.decide(ms(t), latch.state(), Contact::default());
+                assert_eq!(verdict.twist.linear, speed, "at {t} ms: {verdict:?}");
+            }
+        }
     }
 
     #[derive(Clone, Debug)]

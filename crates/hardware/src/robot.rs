@@ -4,7 +4,7 @@
 //!              ┌────────────── Robot ──────────────┐
 //!   drive    ─▶│                                   │─▶ sonar scan image ticks bumper gyro battery head
 //!   head_to  ─▶│  commands ─▶ Gate ◀─▶ Driver      │─▶ pose        (a recording's own, in the frame "log")
-//!              │                                   │─▶ transforms  (where the sensors sit)
+//!   safety   ─▶│                                   │─▶ transforms  (where the sensors sit)
 //!              └───────────────────────────────────┘
 //! ```
 
@@ -12,7 +12,7 @@ use std::sync::{Arc, Mutex};
 
 use runtime::{Agent, AgentType, Envelope, Fault, Input, Output, Step};
 use types::messages::{
-    Battery, Bumper, Echoes, Gyro, Head, Image, LaserScan, Odometry, Transforms, Twist, WheelTicks,
+    Battery, Bumper, Echoes, Gyro, Head, Image, LaserScan, Odometry, Safety, Transforms, Twist, WheelTicks,
 };
 use types::params::Params;
 use types::{Duration, Time};
@@ -42,6 +42,12 @@ pub struct RobotParams {
     /// Whether a press of the bumper sets the latch. Without it a press only stops the wheels and bars the way to its side.
     #[param(default = true)]
     pub bumper_latches: bool,
+    /// A verdict of the safety monitor older than this forbids to move forward (time). 700 ms is two missed readings of a sonar at 4 Hz.
+    #[param(default = Duration::millis(700), min = 0.01, max = 60.0)]
+    pub safety_age: Duration,
+    /// How fast the speed falls to what the safety monitor allows (m/s²). 1 does not tip a tall body; safety counts on it.
+    #[param(default = 1.0, min = 0.01, max = 20.0)]
+    pub braking: f64,
 }
 
 /// The place where a gate waits for its agent, and where it comes back to when the agent ends. Clones are the same place.
@@ -85,7 +91,8 @@ impl Berth {
 /// A robot's sensors as outputs and its actuators as inputs, with the gate in between.
 ///
 /// It runs every 10 ms, and at once when a command comes. Urgent commands are those of a referee or an emergency, those of high
-/// priority a person's, all others the robot's own; the higher one is followed while it is fresh.
+/// priority a person's, all others the robot's own; the higher one is followed while it is fresh. A safety monitor that is wired to it
+/// can slow and stop what anybody commands: it stands behind the drive, too.
 #[derive(Agent)]
 #[agent(kind = "robot")]
 pub struct Robot {
@@ -117,6 +124,8 @@ pub struct Robot {
     drive: Input<Twist>,
     /// Where to turn the head.
     head_to: Input<Head>,
+    /// How fast is safe, past all who command. Once wired, its silence forbids to move forward.
+    safety: Input<Safety>,
     berth: Berth,
     gate: Option<Gate>,
     next_mounts: Time,
@@ -171,8 +180,8 @@ impl Robot {
     }
 
     fn policy(&self) -> Policy {
-        let RobotParams { age_limit, linear_max, angular_max, .. } = self.params;
-        Policy { age_limit, linear_max, angular_max }
+        let RobotParams { age_limit, linear_max, angular_max, safety_age, braking, .. } = self.params;
+        Policy { age_limit, linear_max, angular_max, guarded: self.safety.is_wired(), safety_age, braking }
     }
 }
 
@@ -195,6 +204,9 @@ impl Agent for Robot {
         let polled = gate.poll(now, &wanted, &mut outputs).map_err(|error| Fault { what: error.what })?;
         if let Some(next) = polled.next {
             step.wake_at(next);
+        }
+        if let Some(verdict) = self.safety.newest() {
+            gate.allow(now, verdict.header().stamp, if verdict.blind { 0.0 } else { verdict.linear_max });
         }
         while let Some(command) = self.drive.take() {
             let header = command.header();
@@ -239,6 +251,12 @@ fn note(event: Event, gate: &Gate) {
             "no new command came in time: standing ({} times so far)",
             gate.counts().stale.get()
         ),
+        Event::Slowed => {
+            runtime::note!(
+                "a command is faster than the safety monitor allows: slowed ({} cycles so far)",
+                gate.counts().slowed.get()
+            );
+        }
         Event::Clamped(_) => {
             runtime::note!(
                 "a command is beyond the limits and is cut ({} cycles so far)",
@@ -261,6 +279,7 @@ fn note_set(state: LatchState) {
             Cause::Supervisor => runtime::note!("the latch is set: the supervisor gave up an agent"),
             Cause::Hardware => runtime::note!("the latch is set: the hardware failed"),
             Cause::Nonsense => runtime::note!("the latch is set: commands again and again were no numbers"),
+            Cause::Heedless => runtime::note!("the latch is set: commands went on to be faster than is safe"),
         }
     }
 }

@@ -62,6 +62,9 @@ pub(crate) struct RunArgs {
     /// How long at most, as in 300s; else as long as the goal gives.
     #[arg(long = "for", value_name = "TIME", value_parser = duration)]
     pub(crate) limit: Option<Duration>,
+    /// Ends a simulated run in which no robot has moved for so long, as in 60s: it has given up.
+    #[arg(long, value_name = "TIME", value_parser = duration)]
+    pub(crate) give_up: Option<Duration>,
     /// What the draws of [vary] and all noise come from.
     #[arg(long, value_name = "N", default_value_t = 1, conflicts_with = "seeds")]
     pub(crate) seed: u64,

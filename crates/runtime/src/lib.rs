@@ -109,7 +109,7 @@ pub use check::{check, executors_of, wires_of};
 pub use composition::{Composition, End, Left, Member, PortAt, PortSeen, QueueSeen, WireSeen};
 pub use executor::{Cause, StepFault};
 pub use folder::{FolderError, RunFolder};
-pub use log::{LogChoice, Recorder, write_note};
+pub use log::{LogChoice, Noted, Recorder, write_note};
 pub use memory::Found;
 pub use message_type::{LARGEST_BY_VALUE, MessageType};
 pub use plan::{

@@ -4,6 +4,8 @@
 #![allow(unsafe_code)]
 
 use core::sync::atomic::{AtomicBool, AtomicU64, Ordering};
+use std::collections::BTreeMap;
+use std::collections::btree_map::Entry;
 use std::sync::{Arc, Mutex, PoisonError};
 
 use types::cdr::Writer;
@@ -93,7 +95,69 @@ impl LogShared {
 /// The log thread.
 pub(crate) struct LogThread {
     shared: Arc<LogShared>,
-    thread: Option<std::thread::JoinHandle<()>>,
+    thread: Option<std::thread::JoinHandle<Vec<Noted>>>,
+}
+
+/// What an agent noted in a run, whether that was logged or not: each text once.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Noted {
+    /// Who.
+    pub agent: String,
+    /// What; with its numbers as they were the last time.
+    pub what: String,
+    /// When for the first time.
+    pub first: Time,
+    /// When for the last time.
+    pub last: Time,
+    /// How often.
+    pub count: u64,
+}
+
+/// So many different notes are kept for the end of a run; what is noted beyond is in the log alone.
+const MOST_NOTED: usize = 1024;
+
+/// The notes of a run so far, by who and by the text as it stands in the code.
+#[derive(Default)]
+struct Notes(BTreeMap<(AgentId, &'static str), Kept>);
+
+/// A note that is kept.
+struct Kept {
+    numbers: Vec<f64>,
+    first: Time,
+    last: Time,
+    count: u64,
+}
+
+impl Notes {
+    fn keep(&mut self, time: Time, agent: AgentId, text: &'static str, numbers: &[f64]) {
+        let is_full = self.0.len() >= MOST_NOTED;
+        match self.0.entry((agent, text)) {
+            Entry::Occupied(mut known) => {
+                let known = known.get_mut();
+                known.numbers.clear();
+                known.numbers.extend_from_slice(numbers);
+                (known.last, known.count) = (time, known.count + 1);
+            }
+            Entry::Vacant(place) if !is_full => {
+                place.insert(Kept { numbers: numbers.to_vec(), first: time, last: time, count: 1 });
+            }
+            Entry::Vacant(_) => {}
+        }
+    }
+
+    /// In the order in which they were first noted.
+    fn told(self, directory: &Directory) -> Vec<Noted> {
+        let told = |((agent, text), kept): ((AgentId, &'static str), Kept)| Noted {
+            agent: name_of(directory, agent),
+            what: filled(text, &kept.numbers),
+            first: kept.first,
+            last: kept.last,
+            count: kept.count,
+        };
+        let mut told: Vec<Noted> = self.0.into_iter().map(told).collect();
+        told.sort_by_key(|noted| noted.first);
+        told
+    }
 }
 
 /// How long the log thread sleeps when there is nothing to do.
@@ -114,16 +178,17 @@ impl LogThread {
         Ok(LogThread { shared, thread: Some(thread) })
     }
 
-    /// Ends the thread after it has drained everything.
-    pub(crate) fn finish(mut self) -> u64 {
+    /// Ends the thread after it has drained everything. Gives how many records found no room, and what was noted.
+    pub(crate) fn finish(mut self) -> (u64, Vec<Noted>) {
         self.shared.stop.store(true, Ordering::Release);
+        let mut noted = Vec::new();
         if let Some(thread) = self.thread.take() {
             // It need not sleep to the end of its pause: to a minute of simulated time that adds a millisecond or two.
             thread.thread().unpark();
             // A recorder that panicked has said so; the run itself is not harmed.
-            let _ = thread.join();
+            noted = thread.join().unwrap_or_default();
         }
-        self.shared.dropped.load(Ordering::Relaxed)
+        (self.shared.dropped.load(Ordering::Relaxed), noted)
     }
 }
 
@@ -132,14 +197,18 @@ fn keep(
     mut readers: Vec<trace::Reader>,
     mut recorder: Option<Box<dyn Recorder>>,
     directory: &Directory,
-) {
+) -> Vec<Noted> {
     let mut writer = Writer::new();
+    let mut notes_so_far = Notes::default();
     loop {
         let last = shared.stop.load(Ordering::Acquire);
         let mut records = 0;
         for reader in &mut readers {
             records += reader.drain(|record| {
                 let topics = shared.topics();
+                if let trace::Record::Note { time, agent, text, numbers } = &record {
+                    notes_so_far.keep(*time, *agent, text, numbers);
+                }
                 handle(record, &topics, &mut recorder, directory, &mut writer);
             });
         }
@@ -158,6 +227,7 @@ fn keep(
     if let Some(mut recorder) = recorder {
         recorder.finish();
     }
+    notes_so_far.told(directory)
 }
 
 fn handle(
@@ -239,7 +309,23 @@ pub fn write_note(text: &'static str, numbers: &[f64]) {
 
 #[cfg(test)]
 mod tests {
-    use super::filled;
+    use super::*;
+
+    #[test]
+    fn a_note_is_kept_once_for_each_agent_with_its_last_numbers() {
+        let at = |secs| Time::from_seconds(secs);
+        let mut notes = Notes::default();
+        notes.keep(at(2.0), AgentId(1), "at {}", &[2.0]);
+        notes.keep(at(1.0), AgentId(0), "at {}", &[1.0]);
+        notes.keep(at(3.0), AgentId(1), "at {}", &[3.0]);
+        let told = notes.told(&Directory::new());
+        let told: Vec<_> =
+            told.iter().map(|noted| (noted.what.as_str(), noted.first, noted.last, noted.count)).collect();
+        assert_eq!(told, [("at 1", at(1.0), at(1.0), 1), ("at 3", at(2.0), at(3.0), 2)]);
+        let mut full = Notes::default();
+        (0..2000).for_each(|i| full.keep(at(0.0), AgentId(i), "again", &[]));
+        assert_eq!(full.told(&Directory::new()).len(), MOST_NOTED);
+    }
 
     #[test]
     fn numbers_take_their_places() {

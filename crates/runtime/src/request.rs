@@ -71,14 +71,28 @@ pub enum Request {
     All(Vec<Request>),
 }
 
+impl Request {
+    /// The faults in it, in words.
+    pub(crate) fn faults(&self) -> Vec<String> {
+        match self {
+            Request::Fault { target, fault } => vec![format!("fault {target} {}", fault.name())],
+            Request::All(requests) => requests.iter().flat_map(Request::faults).collect(),
+            _ => Vec::new(),
+        }
+    }
+}
+
 /// How somebody misbehaves on request. The names are those of PX4's failure injection.
+///
+/// Of an agent, what is sent is meant of all its outputs; its steps go on, and so does what it believes. So an actuator agent that is stuck
+/// gives its robot one command for ever, fresh each time.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum FaultKind {
     /// Behaves again.
     Ok,
     /// Does or sends nothing.
     Off,
-    /// Sends the same value again and again.
+    /// Sends the first value of the fault again and again, each time with the stamp of now.
     Stuck,
     /// Sends numbers out of nowhere.
     Garbage,
@@ -86,7 +100,7 @@ pub enum FaultKind {
     Wrong,
     /// Does a quarter of its steps.
     Slow,
-    /// Sends each message some messages later.
+    /// Sends each message some messages later, with its own stamp.
     Delayed,
     /// Sends every other message, by chance.
     Intermittent,

@@ -185,6 +185,15 @@ pub struct Incident {
     pub what: String,
 }
 
+impl Incident {
+    /// What was asked from outside and is told at the end of the run: faults, in words, and what came of it.
+    pub(crate) fn of_faults(faults: Vec<String>, time: Time, outcome: &str) -> Vec<Incident> {
+        let incident =
+            |fault| Incident { time, agent: "control".into(), what: format!("asked: {fault}{outcome}") };
+        faults.into_iter().map(incident).collect()
+    }
+}
+
 /// The registry of agents, ports and wires.
 pub(crate) struct Router {
     name: String,

@@ -204,7 +204,7 @@ fn play(simulation: Simulation) -> Result<Report, CannotRun> {
     let Player { router, context, now, .. } = player;
     // The writer goes first, so that the log thread finds the ring at rest.
     drop(context);
-    let log_dropped = log.finish();
+    let (log_dropped, noted) = log.finish();
     Ok(Report {
         ended,
         time: now.since_start(),
@@ -213,6 +213,7 @@ fn play(simulation: Simulation) -> Result<Report, CannotRun> {
         incidents: router.incidents,
         stalls: 0,
         log_dropped,
+        noted,
     })
 }
 
@@ -363,10 +364,16 @@ impl Player {
             Ask::Request(request, answer) => {
                 let quits = matches!(*request, Request::Quit);
                 let said = format!("{request:?}");
+                let faults = request.faults();
                 let result = self.apply(*request);
                 let outcome =
                     result.as_ref().err().map_or(String::new(), |refusal| format!("; refused: {refusal}"));
                 self.context.log(|log| log.line(self.now, "control", &format!("asked: {said}{outcome}")));
+                // It is in the log already.
+                let incidents = Incident::of_faults(faults, self.now, &outcome);
+                self.incidents_seen += incidents.len();
+                let at = self.incidents_seen - incidents.len();
+                self.router.incidents.splice(at..at, incidents);
                 // Whoever asked may be gone.
                 let _ = answer.send(result);
                 return quits.then(|| "asked to quit".into());

@@ -9,7 +9,7 @@ use types::{Duration, Time};
 use crate::agent::Registry;
 use crate::check::{executors_of, wires_of};
 use crate::executor::Core;
-use crate::log::{LogChoice, Recorder};
+use crate::log::{LogChoice, Noted, Recorder};
 use crate::names::Directory;
 use crate::plan::Plan;
 use crate::queue_plan::PlanParts;
@@ -165,6 +165,8 @@ pub struct Report {
     pub stalls: u64,
     /// Records that found no room in the log.
     pub log_dropped: u64,
+    /// What the agents noted, logged or not.
+    pub noted: Vec<Noted>,
 }
 
 /// Why a plan does not run.

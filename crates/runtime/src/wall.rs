@@ -327,7 +327,7 @@ impl Runner {
         // A short run may be over before anybody has looked at what its threads were granted.
         self.note_grants();
         let view = self.router.view(now);
-        let log_dropped = self.log.finish();
+        let (log_dropped, noted) = self.log.finish();
         Ok(Report {
             ended,
             time: now - self.begun,
@@ -336,6 +336,7 @@ impl Runner {
             incidents: self.router.incidents,
             stalls: self.witness.stalls(),
             log_dropped,
+            noted,
         })
     }
 
@@ -417,10 +418,16 @@ impl Runner {
             Ask::Request(request, answer) => {
                 let quits = matches!(*request, Request::Quit);
                 let said = format!("{request:?}");
+                let faults = request.faults();
                 let result = self.apply(*request);
                 let outcome =
                     result.as_ref().err().map_or(String::new(), |refusal| format!("; refused: {refusal}"));
                 self.router.log_shared.note(now, "control", &format!("asked: {said}{outcome}"));
+                // It is in the log already.
+                let incidents = Incident::of_faults(faults, now, &outcome);
+                self.incidents_seen += incidents.len();
+                let at = self.incidents_seen - incidents.len();
+                self.router.incidents.splice(at..at, incidents);
                 // Whoever asked may be gone.
                 let _ = answer.send(result);
                 return quits.then(|| "asked to quit".into());

@@ -6,11 +6,12 @@ use super::graph::Graph;
 use super::tree::Tree;
 
 /// The documents that are read for names.
-const PAGES: [&str; 6] = [
+const PAGES: [&str; 7] = [
     "README.md",
     "ARCHITECTURE.md",
     "CONTRIBUTING.md",
     "docs/coverage.md",
+    "docs/faults.md",
     "docs/performance.md",
     "CHANGELOG.md",
 ];

@@ -55,11 +55,13 @@ pub enum Cause {
     Hardware = 7,
     /// Commands again and again held what is no number: who makes them is broken.
     Nonsense = 8,
+    /// Commands again and again were faster than is safe: who makes them does not listen.
+    Heedless = 9,
 }
 
 impl Cause {
     /// All causes.
-    pub const ALL: [Cause; 9] = [
+    pub const ALL: [Cause; 10] = [
         Cause::Bumper,
         Cause::Safety,
         Cause::Person,
@@ -69,6 +71,7 @@ impl Cause {
         Cause::Supervisor,
         Cause::Hardware,
         Cause::Nonsense,
+        Cause::Heedless,
     ];
 
     /// Its name on the screen.
@@ -83,6 +86,7 @@ impl Cause {
             Cause::Supervisor => "supervisor",
             Cause::Hardware => "hardware",
             Cause::Nonsense => "nonsense",
+            Cause::Heedless => "heedless",
         }
     }
 

@@ -190,3 +190,28 @@ fn a_gate_that_is_dropped_leaves_nothing_in_motion() {
     assert!(moved(&truth).is(at_rest), "{:?}, was {at_rest:?}", moved(&truth));
     assert!(at_rest.head.0 < 1.0, "it was still turning: {at_rest:?}");
 }
+
+/// Commands as fast as that for so long (ms), while it is safe to go half as fast.
+fn push_on(gate: &mut Gate, authority: Authority, from: i64, millis: i64) -> i64 {
+    for t in (from..from + millis).step_by(10) {
+        let now = Time(t * 1_000_000);
+        gate.poll(now, &Listening::default(), &mut Deaf).unwrap();
+        gate.allow(now, now, 0.1);
+        gate.command(now, authority, now, Twist::new(0.2, 0.0));
+        gate.apply(now).unwrap();
+    }
+    from + millis
+}
+
+#[test]
+fn who_does_not_hear_what_is_safe_is_stopped_for_good_unless_it_is_a_person() {
+    let (mut gate, truth, latch) = raised();
+    gate.set_policy(Policy { guarded: true, ..Policy::default() }, true);
+    let end = push_on(&mut gate, Authority::Person, 0, 3000);
+    assert!(!latch.is_set() && gate.counts().slowed.get() > 250);
+    assert!((truth.robot("h1").unwrap().truth.linear - 0.1).abs() < 0.01);
+    let end = push_on(&mut gate, Authority::Robot, end + 500, 900);
+    assert!(!latch.is_set(), "it may be late now and then");
+    push_on(&mut gate, Authority::Robot, end, 200);
+    assert!(latch.state().has(Cause::Heedless));
+}

@@ -15,7 +15,7 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use control::words;
 use record::log::{Clock, Message, ROSOUT, Reader};
-use runtime::{Plan, Refusal, Request, TimedRequest};
+use runtime::{Incident, Plan, Refusal, Request, TimedRequest};
 use types::{Duration, Time};
 
 use crate::error::Failure;
@@ -91,6 +91,17 @@ struct Inner {
     told: usize,
     /// When the repeated run was asked to quit.
     quits: Option<Time>,
+    /// What was done of the robots' deeds.
+    done: Vec<Incident>,
+    /// For each fault, when it was asked and how far the robots had come (m).
+    faults: Vec<(Time, f64)>,
+    /// When a robot moved last.
+    moved: Option<Time>,
+}
+
+/// Whether a fault was asked, and not refused.
+pub(super) fn is_fault(incident: &Incident) -> bool {
+    incident.what.starts_with("asked: fault ") && !incident.what.contains(REFUSED)
 }
 
 impl Asked {
@@ -151,6 +162,36 @@ impl Asked {
         }
         due.extend(inner.waiting.drain(..).map(|(deed, done)| Due { deed, by: OUTSIDE, done: Some(done) }));
         due
+    }
+
+    /// A deed was done.
+    pub(super) fn done(&self, deed: Incident) {
+        self.inner().done.push(deed);
+    }
+
+    /// The deeds that were done.
+    pub(super) fn deeds(&self) -> Vec<Incident> {
+        self.inner().done.clone()
+    }
+
+    /// The robots moved.
+    pub(super) fn moved(&self, now: Time) {
+        self.inner().moved = Some(now);
+    }
+
+    /// When they moved last.
+    pub(super) fn last_moved(&self) -> Option<Time> {
+        self.inner().moved
+    }
+
+    /// A fault was asked when the robots had come so far (m).
+    pub(super) fn failed(&self, fault: &Incident, way: f64) {
+        self.inner().faults.push((fault.time, way));
+    }
+
+    /// How far the robots had come when a fault was asked (m).
+    pub(super) fn way_before(&self, fault: &Incident) -> Option<f64> {
+        self.inner().faults.iter().find(|(time, _)| *time == fault.time).map(|(_, way)| *way)
     }
 
     /// Nobody looks any more: who waits is told so.

@@ -12,7 +12,7 @@ use runtime::{Incident, Observer, Verdict};
 use types::messages::{Odometry, Twist};
 use types::{Duration, Name, Pose, Time};
 
-use super::asked::{Asked, Deed, OUTSIDE};
+use super::asked::{self, Asked, Deed, OUTSIDE};
 use super::prepare::Ready;
 use crate::terminal;
 
@@ -21,6 +21,8 @@ use crate::terminal;
 const LOOK: Duration = Duration::millis(20);
 /// Every so many looks the truth is kept: ten times a second, which at walking speed is every few centimetres.
 const KEEP_EVERY: u64 = 5;
+/// What is slower than this stands (m/s, rad/s).
+const STANDS: (f64, f64) = (0.01, 0.01);
 /// The frame of the simulated world in the log.
 pub(crate) const WORLD: &str = "world";
 
@@ -78,6 +80,11 @@ pub(crate) struct Judge {
     facts: Option<Facts>,
     people: Vec<String>,
     looks: u64,
+    /// How many incidents it has seen.
+    seen: usize,
+    /// When a robot moved last, and how long it waits for the next time.
+    moved: Option<Time>,
+    patience: Option<Duration>,
 }
 
 /// Why runs end, in the words of the summary.
@@ -86,6 +93,8 @@ pub(crate) const DECIDED: &str = "the goal is decided";
 pub(crate) const INTERRUPTED: &str = "interrupted";
 /// See [`DECIDED`].
 pub(crate) const PLAYED: &str = "the recording is over";
+/// See [`DECIDED`].
+pub(crate) const GAVE_UP: &str = "the robot has given up: it has not moved for long";
 
 impl Judge {
     pub(crate) fn new(
@@ -108,6 +117,9 @@ impl Judge {
             begun: None,
             facts,
             looks: 0,
+            seen: 0,
+            moved: None,
+            patience: None,
         }
     }
 
@@ -115,6 +127,12 @@ impl Judge {
     /// answer requests while it waits: in the middle of an instant, where no repeated run could ask them again.
     pub(crate) fn paced(mut self, speed: Option<f64>) -> Judge {
         self.speed = speed;
+        self
+    }
+
+    /// Ends the run when no robot has moved for so long.
+    pub(crate) fn patient(mut self, patience: Option<Duration>) -> Judge {
+        self.patience = patience;
         self
     }
 
@@ -137,6 +155,7 @@ impl Judge {
                 Deed::Interrupt => ends = true,
             }
             self.note(now, due.by, &due.deed);
+            self.asked.done(Incident { time: now, agent: due.by.to_owned(), what: due.deed.note() });
             if let Some(done) = due.done {
                 // Whoever asked may be gone.
                 let _ = done.try_send(());
@@ -149,6 +168,25 @@ impl Judge {
         if let Some(facts) = &self.facts {
             facts.put(Fact { time, what: What::Asked { by, text: deed.note() } });
         }
+    }
+
+    /// Keeps how far the robots had come when a fault began, and when they moved last.
+    fn follow(&mut self, now: Time, incidents: &[Incident]) {
+        let Some(truth) = &self.truth else { return };
+        let (mut way, mut moves) = (0.0, false);
+        for (_, robot) in truth.robots() {
+            way += robot.truth.distance;
+            moves |= robot.truth.linear.abs() > STANDS.0 || robot.truth.angular.abs() > STANDS.1;
+        }
+        if moves {
+            self.moved = Some(now);
+            self.asked.moved(now);
+        }
+        let new = incidents.get(self.seen..).unwrap_or_default();
+        for incident in new.iter().filter(|incident| asked::is_fault(incident)) {
+            self.asked.failed(incident, way);
+        }
+        self.seen = incidents.len();
     }
 
     fn keep(&self, time: Time) {
@@ -182,10 +220,11 @@ impl Observer for Judge {
         LOOK
     }
 
-    fn observe(&mut self, now: Time, _: &[Incident]) -> Verdict {
+    fn observe(&mut self, now: Time, incidents: &[Incident]) -> Verdict {
         let (begun, _) = *self.begun.get_or_insert_with(|| (now, terminal::host_now()));
         let since_start = Duration(now.0 - begun.0);
         self.wait(since_start);
+        self.follow(now, incidents);
         if self.looks.is_multiple_of(KEEP_EVERY) {
             self.keep(now);
         }
@@ -200,6 +239,10 @@ impl Observer for Judge {
         }
         if self.truth.as_ref().is_some_and(Truth::decided) {
             return ended(DECIDED);
+        }
+        let idle = now - self.moved.unwrap_or(begun);
+        if self.truth.is_some() && self.patience.is_some_and(|patience| idle >= patience) {
+            return ended(GAVE_UP);
         }
         if !self.recordings.is_empty() && self.recordings.iter().all(|counts| counts.ended()) {
             return ended(PLAYED);

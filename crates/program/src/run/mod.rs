@@ -154,6 +154,7 @@ impl One<'_> {
         let facts = log.as_ref().map(|(_, facts, _)| facts.clone());
         let judge = judge::Judge::new(&ready, self.asked_to_end.clone(), asked.clone(), facts);
         let judge = judge.paced(self.speed().filter(|_| self.clock == ClockChoice::Sim));
+        let judge = judge.patient(self.args.give_up);
         let (recorder, outcome) = match log {
             Some((file, _, outcome)) => (Some(Box::new(file) as Box<dyn Recorder>), Some(outcome)),
             None => (None, None),
@@ -176,6 +177,7 @@ impl One<'_> {
         summary.images = self.args.images;
         summary.log = outcome.map(|outcome| outcome.lock().unwrap_or_else(PoisonError::into_inner).clone());
         summary.repeats(&asked);
+        summary.tells(&asked);
         summary.repeat = self.repeat.as_ref().map(|repeat| self.compared(repeat, &ready));
         self.write_files(&mut summary);
         Ok(summary)
@@ -320,6 +322,7 @@ fn clock_name(clock: ClockChoice) -> &'static str {
 mod tests {
     use super::*;
     use record::log::Reader;
+    use runtime::TimedRequest;
     use types::Message as _;
     use types::messages::Transforms;
 
@@ -347,6 +350,71 @@ mod tests {
             ..Options::default()
         };
         Simulation::new(&ready.plan, &ready.registry, options).unwrap().run().unwrap();
+    }
+
+    /// Runs the exploration with this asked in `[[at]]`, and gives its summary.
+    fn summary_of(at: Duration, asked: &str, limit: Duration, give_up: Option<Duration>) -> Summary {
+        #[derive(clap::Parser)]
+        struct Line {
+            #[command(flatten)]
+            run: RunArgs,
+        }
+        let line: Line = clap::Parser::parse_from(["run", "exploration", "--no-log"]);
+        let args = RunArgs { limit: Some(limit), give_up, ..line.run };
+        let mut scenario = options::scenario(&args, with_robots(agents::registry())).unwrap();
+        let words = control::words::split(asked).unwrap();
+        scenario.file.plan.requests = vec![TimedRequest { at, words, place: Default::default() }];
+        let ready = scenario.prepare(1).unwrap();
+        let (clock, asked_to_end) = (ClockChoice::Sim, Arc::default());
+        let one = One {
+            args: &args,
+            scenario: &scenario,
+            seed: 1,
+            clock,
+            watched: false,
+            place: None,
+            asked_to_end,
+            serves: false,
+            repeat: None,
+        };
+        one.run(ready).unwrap()
+    }
+
+    #[test]
+    fn the_summary_tells_what_became_of_a_fault() {
+        let secs = Duration::secs;
+        let summary = summary_of(secs(8), "fault h1.sonar off", secs(60), Some(secs(20)));
+        let document = summary.to_json();
+        let fault = &document["incidents"][0];
+        assert_eq!((&fault["what"], &fault["time_s"]), (&"asked: fault h1.sonar off".into(), &8.0.into()));
+        let effect = fault["effect"].as_str().unwrap();
+        assert!(
+            effect.starts_with("it went on for 0.") && effect.contains(" and has stood since "),
+            "{effect}"
+        );
+        assert_eq!(summary.ended, judge::GAVE_UP);
+        assert!(summary.time < secs(35), "{}", summary.time);
+        let text = summary.to_text(false);
+        let told = "safety: blind: no ranges that can be trusted (at 8.";
+        assert!(
+            text.contains(told) && text.contains("the plan asked for \"fault h1.sonar off\" at 8 s; "),
+            "{text}"
+        );
+    }
+
+    #[test]
+    fn the_summary_tells_who_set_the_latch_and_when() {
+        let secs = Duration::secs;
+        let nonsense = summary_of(secs(8), "fault drive garbage", secs(20), None);
+        let document = nonsense.to_json();
+        let latch = &document["robots"][0]["latch"];
+        assert_eq!(latch["causes"], serde_json::json!(["nonsense"]));
+        assert!((8.0..9.0).contains(&latch["set_s"].as_f64().unwrap()), "{latch}");
+        assert!(document["incidents"][0]["effect"].as_str().unwrap().contains("(nonsense)"));
+        let stop = summary_of(secs(3), "stop", secs(5), None);
+        let text = stop.to_text(false);
+        assert!(text.contains("the plan asked for \"stop\" at 3 s"), "{text}");
+        assert!(text.contains("set at 3 s (person)"), "{text}");
     }
 
     #[test]

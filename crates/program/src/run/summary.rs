@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 use std::path::PathBuf;
 
-use runtime::{AgentView, CannotRun, Figure, Incident, Report, SystemView};
+use runtime::{AgentView, CannotRun, Figure, Incident, Noted, Report, SystemView};
 use serde_json::{Value as Json, json};
 use types::{Duration, Time};
 
@@ -24,7 +24,9 @@ pub(crate) struct RobotOutcome {
     pub(crate) commands: u64,
     pub(crate) stale: u64,
     pub(crate) clamped: u64,
-    pub(crate) latched: bool,
+    pub(crate) slowed: u64,
+    /// Since when and why its latch is set; nothing where it is not.
+    pub(crate) latch: Option<(Time, Vec<&'static str>)>,
     /// Whether its commands went nowhere, because it is a recording.
     pub(crate) shadow: bool,
     pub(crate) report: Option<hardware::Report>,
@@ -63,6 +65,10 @@ pub(crate) struct Summary {
     /// Who took or freed memory in real time, and how often; nothing where nobody watched.
     pub(crate) allocations: Option<Vec<(String, u64)>>,
     pub(crate) incidents: Vec<Incident>,
+    /// What became of the faults that were asked: when, and in words.
+    pub(crate) effects: Vec<(Time, String)>,
+    /// What the agents noted.
+    pub(crate) noted: Vec<Noted>,
     /// When the run began on its own clock.
     pub(crate) begun: Time,
     pub(crate) log: Option<LogOutcome>,
@@ -85,7 +91,11 @@ impl Summary {
                 commands: robot.counts.commands.get(),
                 stale: robot.counts.stale.get(),
                 clamped: robot.counts.clamped.get(),
-                latched: robot.latch.is_set(),
+                slowed: robot.counts.slowed.get(),
+                latch: robot.latch.is_set().then(|| {
+                    let causes = robot.latch.state().causes().map(hardware::latch::Cause::name);
+                    (robot.latch.set_at(), causes.collect())
+                }),
                 shadow: robot.description.clock == hardware::ClockKind::Recorded,
                 report: robot.report.clone(),
             })
@@ -118,6 +128,8 @@ impl Summary {
             log_dropped: report.log_dropped,
             allocations: allocations(&report.view),
             incidents: report.incidents,
+            effects: Vec::new(),
+            noted: report.noted,
             begun: Time(report.view.now.0 - report.time.0),
             agents: report.view.agents,
             log: None,
@@ -134,6 +146,36 @@ impl Summary {
             if asked.is_repeated(number) {
                 incident.agent = asked::LOG.into();
             }
+        }
+    }
+
+    /// Takes in what was done to the robots, and tells what became of each fault.
+    pub(crate) fn tells(&mut self, asked: &Asked) {
+        self.incidents.extend(asked.deeds());
+        self.incidents.sort_by_key(|incident| incident.time);
+        let faults = self.incidents.iter().filter(|incident| asked::is_fault(incident));
+        let effect = |fault: &Incident| {
+            let way = self.distance()? - asked.way_before(fault)?;
+            Some((fault.time, self.effect(fault.time, way, asked.last_moved())))
+        };
+        self.effects = faults.filter_map(effect).collect();
+    }
+
+    /// What became of a robot after a fault, since which it went so far (m).
+    fn effect(&self, fault: Time, way: f64, moved: Option<Time>) -> String {
+        let at = |time: Time| seconds((time - self.begun).seconds());
+        let latch = self.robots.iter().filter_map(|robot| robot.latch.as_ref());
+        let end = Time(self.begun.0 + self.time.0);
+        let stands_since = moved.map_or(self.begun, |moved| moved.max(fault));
+        let went = format!("it went on for {way:.1} m");
+        if let Some((time, causes)) = latch.min_by_key(|(time, _)| *time).filter(|(time, _)| *time >= fault) {
+            format!("{went}, until the latch was set at {} ({})", at(*time), causes.join(", "))
+        } else if self.met == Some(true) {
+            format!("{went} and met its goal")
+        } else if end - stands_since > STANDS {
+            format!("{went} and has stood since {}", at(stands_since))
+        } else {
+            went
         }
     }
 
@@ -175,9 +217,23 @@ impl Summary {
     /// The documented shape of a run.
     pub(crate) fn to_json(&self) -> Json {
         let agents: Vec<Json> = self.agents.iter().map(agent_json).collect();
-        let robots: Vec<Json> = self.robots.iter().map(robot_json).collect();
+        let robots: Vec<Json> = self.robots.iter().map(|robot| robot_json(robot, self.begun)).collect();
         let incidents = self.incidents.iter().map(|incident| {
-            json!({"time_s": (incident.time - self.begun).seconds(), "agent": incident.agent, "what": incident.what})
+            let mut told =
+                json!({"time_s": self.since(incident.time), "agent": incident.agent, "what": incident.what});
+            if let Some(effect) = self.effect_of(incident) {
+                told["effect"] = effect.into();
+            }
+            told
+        });
+        let noted = self.noted.iter().map(|noted| {
+            json!({
+                "agent": noted.agent,
+                "what": noted.what,
+                "first_s": self.since(noted.first),
+                "last_s": self.since(noted.last),
+                "count": noted.count,
+            })
         });
         json!({
             "system": self.system,
@@ -203,6 +259,7 @@ impl Summary {
             "agents": agents,
             "robots": robots,
             "incidents": incidents.collect::<Vec<_>>(),
+            "notes": noted.collect::<Vec<_>>(),
             "log": self.log.as_ref().map(|log| json!({
                 "messages": log.tally.safe,
                 "lost": log.tally.lost + self.log_dropped,
@@ -243,7 +300,7 @@ impl Summary {
             line(format!("  stages       met after {}", at.join(", ")));
         }
         for robot in &self.robots {
-            robot_lines(robot, self.robots.len() > 1).into_iter().for_each(&mut line);
+            robot_lines(robot, self.robots.len() > 1, self.begun).into_iter().for_each(&mut line);
         }
         if self.robots.iter().any(|robot| robot.shadow) {
             line(format!("               {}", self.wishes()));
@@ -255,6 +312,9 @@ impl Summary {
         }
         for text in self.told() {
             line(format!("  happened     {text}"));
+        }
+        for text in self.since_then() {
+            line(format!("  then         {text}"));
         }
         if let Some(text) = self.granted() {
             line(format!("  real time    {text}"));
@@ -333,6 +393,29 @@ impl Summary {
         Some(format!("taken or freed in real time: {}", each.join(", ")))
     }
 
+    /// A time of the run (s since its start).
+    fn since(&self, time: Time) -> f64 {
+        (time - self.begun).seconds()
+    }
+
+    /// What became of a fault; nothing of what is none, or where nobody knows.
+    fn effect_of(&self, incident: &Incident) -> Option<&str> {
+        let of = self.effects.iter().find(|(time, _)| *time == incident.time);
+        of.filter(|_| asked::is_fault(incident)).map(|(_, effect)| effect.as_str())
+    }
+
+    /// What agents noted for the first time after the first incident: mostly what they did about it.
+    fn since_then(&self) -> Vec<String> {
+        let Some(first) = self.incidents.first() else { return Vec::new() };
+        let new = self.noted.iter().filter(|noted| noted.first >= first.time);
+        let told = |noted: &Noted| {
+            let Noted { agent, what, count, .. } = noted;
+            let often = if *count > 1 { format!(", {count} times") } else { String::new() };
+            format!("{agent}: {what} (at {}{often})", seconds(self.since(noted.first)))
+        };
+        new.map(told).collect()
+    }
+
     /// What the supervisor did, in sentences; a death and the start after it are one.
     fn told(&self) -> Vec<String> {
         let mut told = Vec::new();
@@ -349,6 +432,9 @@ impl Summary {
                 let after = (self.incidents[later].time - incident.time).seconds();
                 text += &format!(", started again {after:.1} s later");
                 done[later] = true;
+            }
+            if let Some(effect) = self.effect_of(incident) {
+                text += &format!("; {effect}");
             }
             told.push(text);
         }
@@ -401,9 +487,15 @@ fn allocations(view: &SystemView) -> Option<Vec<(String, u64)>> {
 /// An incident in a sentence.
 fn happened(incident: &Incident, at: &str) -> String {
     let Incident { agent, what, .. } = incident;
-    if agent == asked::PLAN || agent == asked::LOG {
+    let who = match agent.as_str() {
+        asked::PLAN => Some("the plan"),
+        asked::LOG => Some("the log"),
+        asked::OUTSIDE => Some("somebody"),
+        _ => None,
+    };
+    if let Some(who) = who.filter(|_| what.starts_with("asked: ")) {
         return format!(
-            "the {agent} {} at {at}",
+            "{who} {} at {at}",
             what.replacen("asked: ", "asked for \"", 1).replacen("; refused", "\"; refused", 1)
                 + if what.contains("; refused") { "" } else { "\"" }
         );
@@ -414,10 +506,12 @@ fn happened(incident: &Incident, at: &str) -> String {
     }
 }
 
+/// Who has not moved for so long at the end has given up.
+const STANDS: Duration = Duration::secs(5);
 /// The supervisor's words for a restart.
 const STARTED_AGAIN: &str = "started again";
 
-fn robot_lines(robot: &RobotOutcome, several: bool) -> Vec<String> {
+fn robot_lines(robot: &RobotOutcome, several: bool, begun: Time) -> Vec<String> {
     let mut lines = Vec::new();
     let who = if several { format!("{}: ", robot.name) } else { String::new() };
     if let Some(truth) = &robot.truth {
@@ -452,8 +546,15 @@ fn robot_lines(robot: &RobotOutcome, several: bool) -> Vec<String> {
             robot.stale
         ));
     }
-    if robot.latched {
-        lines.push(format!("  latch        {who}set: the robot stands until it is reset"));
+    if robot.slowed > 0 {
+        lines.push(format!(
+            "  gate         {who}slowed {} times what was commanded faster than is safe",
+            robot.slowed
+        ));
+    }
+    if let Some((time, causes)) = &robot.latch {
+        let (at, causes) = (seconds((*time - begun).seconds()), causes.join(", "));
+        lines.push(format!("  latch        {who}set at {at} ({causes}): the robot stands until it is reset"));
     }
     lines
 }
@@ -495,7 +596,7 @@ pub(crate) fn figure_json(name: &str, figure: &Figure) -> Json {
     })
 }
 
-fn robot_json(robot: &RobotOutcome) -> Json {
+fn robot_json(robot: &RobotOutcome, begun: Time) -> Json {
     json!({
         "name": robot.name,
         "collisions": robot.truth.map(|truth| truth.collisions),
@@ -504,7 +605,12 @@ fn robot_json(robot: &RobotOutcome) -> Json {
         "commands": robot.commands,
         "stale": robot.stale,
         "clamped": robot.clamped,
-        "latched": robot.latched,
+        "slowed": robot.slowed,
+        "latched": robot.latch.is_some(),
+        "latch": robot.latch.as_ref().map(|(time, causes)| json!({
+            "set_s": (*time - begun).seconds(),
+            "causes": causes,
+        })),
         "shadow": robot.shadow,
         "recording": robot.report.as_ref().map(|report| json!({
             "lines": report.lines,

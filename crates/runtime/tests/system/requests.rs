@@ -1,6 +1,6 @@
 //! What is asked of a system that runs.
 
-use runtime::{Simulation, WirePlan};
+use runtime::{Control, FaultKind, Live, Options, Request, Simulation, WirePlan};
 use types::value::Value;
 
 use crate::{at, chain, heard, options, types};
@@ -91,4 +91,36 @@ fn all_mistakes_of_a_plan_are_found_at_once() {
     ] {
         assert!(said.iter().any(|mistake| mistake.contains(part)), "{part} in {said:#?}");
     }
+}
+
+/// Asks for a fault of the relay, for one of nobody, and for the end.
+fn ask_for_faults(control: &Control) {
+    let fault = |target: &str, fault| Request::Fault { target: target.into(), fault };
+    let both = vec![fault("relay", FaultKind::Panic), fault("source.out", FaultKind::Wrong)];
+    control.request(Request::All(both)).unwrap();
+    control.request(fault("nobody", FaultKind::Off)).unwrap_err();
+    control.request(Request::Set { agent: "source".into(), key: "by".into(), value: 2.0.into() }).unwrap();
+    control.request(Request::Quit).unwrap();
+}
+
+#[test]
+fn a_fault_that_is_asked_while_it_runs_is_told_at_the_end_like_one_of_the_plan() {
+    let options = || Options { limit: None, ..options(0) };
+    let simulation = Simulation::new(&chain("live-sim"), &types(), options()).unwrap();
+    let live = Live::new(&chain("live-wall"), &types(), options()).unwrap();
+    let outside = [simulation.control(), live.control()].map(|control| {
+        let work = move || ask_for_faults(&control);
+        std::thread::Builder::new().name("outside".into()).spawn(work).unwrap()
+    });
+    for report in [simulation.run().unwrap(), live.run().unwrap()] {
+        let asked: Vec<&str> = report
+            .incidents
+            .iter()
+            .filter(|incident| incident.agent == "control")
+            .map(|incident| incident.what.as_str())
+            .collect();
+        assert_eq!(asked[..2], ["asked: fault relay panic", "asked: fault source.out wrong"]);
+        assert!(asked.len() == 3 && asked[2].contains("fault nobody off; refused: "), "{asked:?}");
+    }
+    outside.into_iter().for_each(|thread| thread.join().unwrap());
 }
