@@ -314,5 +314,16 @@ pub(super) fn measure(setting: &Setting<'_>) -> Result<Outcome, Failure> {
         outcome.compare_tails("reflex_runtime_alone/bare_chain", &thin, &theirs);
         outcome.figures.extend([ours, thin, theirs]);
     }
+    outcome.figure("program", "MB", mapped().map(|bytes| bytes as f64 * 1e-6).into_iter().collect());
     Ok(outcome)
+}
+
+/// How much of the program's file is mapped into memory (bytes): its code and its data, of every part, without what a debugger reads.
+fn mapped() -> Option<u64> {
+    let program = std::env::current_exe().ok()?;
+    let maps = std::fs::read_to_string("/proc/self/maps").ok()?;
+    let of_program = maps.lines().filter(|line| line.ends_with(&*program.to_string_lossy()));
+    let ends = of_program.filter_map(|line| line.split(' ').next()?.split_once('-'));
+    let address = |text: &str| u64::from_str_radix(text, 16).ok();
+    ends.map(|(begin, end)| Some(address(end)? - address(begin)?)).sum()
 }
