@@ -171,8 +171,8 @@ const IN_FRONT: f64 = 0.7;
 /// What is nearer to straight ahead than this comes nearer still (rad): 65°. To what is farther off, a robot that goes straight on comes
 /// nearer by 9 % of its distance from the middle of the body, which is 4 cm of what is touched.
 const OBLIQUE: f64 = 1.13;
-/// What is farther from the rim than this is afar (m): of false echoes from between here and there one in fifty is as near as a touch.
-const AFAR: f64 = 1.0;
+/// What is farther from the rim than this is afar (m): of the false echoes that fall short of it few are as near as a touch.
+const AFAR: f64 = 2.0;
 /// What is farther from straight ahead than this is left behind (rad): 110°.
 const BESIDE: f64 = 0.6 * PI;
 /// A turn at this rate is one (rad/s), not the noise of a controller.
