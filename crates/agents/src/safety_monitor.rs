@@ -282,9 +282,10 @@ impl Watch {
         (!self.points.is_empty()).then(|| judge_way(&params.law(), Ring::Beams(&self.points), self.motion))
     }
 
-    /// With something obliquely ahead as near as can be told it creeps, and past it, beside it, it goes slowly; with that in front it may
-    /// be nearer than told, and it stands. An echo from there that the filter does not yet believe is believed where the last one came
-    /// from afar: a false one seldom falls just there, and a smooth thing that was silent until now may be silent again.
+    /// With something obliquely ahead as near as can be told it creeps, and past it, beside it, it goes slowly, the more so while it turns
+    /// to it; with that in front it may be nearer than told, and it stands. An echo from there that the filter does not yet believe is
+    /// believed where the last one came from afar: a false one seldom falls just there, and a smooth thing that was silent until now may
+    /// be silent again.
     fn touch(&self, params: &SafetyParams, raw: &Ranges, filtered: &Ranges, verdict: &mut Verdict) {
         let close = f64::from(filtered.range_min).max(params.radius + params.touch);
         if echoes(filtered).any(|(bearing, range)| range <= close && wrap(bearing).abs() < IN_FRONT) {
@@ -299,7 +300,12 @@ impl Watch {
         if echoes(filtered).chain(appeared).chain(self.points.iter().copied()).any(touched) {
             verdict.linear_max = verdict.linear_max.min(params.creep);
         } else if verdict.nearest <= params.touch && verdict.nearest_bearing.abs() <= BESIDE {
-            verdict.linear_max = verdict.linear_max.min(params.pass);
+            // Nearer than a sonar tells it is where it was heard before, and its cone is as wide as what is left.
+            let untold = params.radius + verdict.nearest < f64::from(filtered.range_min);
+            let ahead = verdict.nearest_bearing.abs() < PI / 2.0;
+            let turns_to_it = self.motion.angular * verdict.nearest_bearing.signum() > TURNING;
+            let speed = if untold && ahead && turns_to_it { params.avoid_speed } else { params.pass };
+            verdict.linear_max = verdict.linear_max.min(speed);
         }
     }
 
@@ -445,6 +451,29 @@ mod tests {
         assert_eq!([2, 3, 4].map(|beam| close(beam, 0.375)), [0.1, 0.35, 0.6]);
         assert_eq!([10, 9, 8].map(|beam| close(beam, 0.375)), [0.1, 0.35, 0.6]);
         assert_eq!([2, 3].map(|beam| close(beam, 0.45)), [0.6, 0.6]);
+    }
+
+    #[test]
+    fn past_what_is_nearer_than_a_sonar_tells_it_goes_slower_while_it_turns_to_it() {
+        let params = SafetyParams { creep: 0.1, avoid_speed: 0.2, pass: 0.35, ..SafetyParams::default() };
+        // Heard at 80° on the left, 0.16 m from the rim; a step to the left later it is 0.12 m away, and silent.
+        let fastest = |angular, moved| {
+            let mut ranges = Ranges { range_min: 0.375, ..around(6.2, 6.2, 6.2) };
+            ranges.values.fill(6.2);
+            ranges.values[3] = 0.385;
+            let mut watch = watch(ranges);
+            watch.pose = Some(Pose::default());
+            watch.judge(&params, Time::ZERO);
+            ranges.values[3] = 4.0;
+            let later = Time::from_seconds(0.25);
+            watch.filtered = Some(Dated { value: ranges, stamp: later });
+            watch.pose = Some(Pose::new(-0.08, moved, 0.0));
+            watch.motion = Twist::new(0.0, angular);
+            watch.judge(&params, later).0.linear_max
+        };
+        assert_eq!([fastest(0.0, 0.04), fastest(-0.3, 0.04), fastest(0.3, 0.04)], [0.35, 0.35, 0.2]);
+        // As far as a sonar tells it is known how near it is.
+        assert_eq!(fastest(0.3, -0.01), 0.35);
     }
 
     #[test]
