@@ -9,6 +9,7 @@ use types::params::{Fields, Params, Refused};
 use types::value::{Mistake, Table, Value};
 use types::{AgentId, Duration, Message, Time};
 
+use crate::fetch::Depth;
 use crate::port::{PortOptions, PortShape, PortVisit};
 
 pub use macros::Agent;
@@ -194,6 +195,8 @@ pub(crate) trait Body: Send {
     fn as_any(&mut self) -> &mut dyn Any;
     fn visit_ports(&mut self, visit: &mut dyn FnMut(PortVisit<'_>));
     fn swap_params(&mut self, params: &mut (dyn Any + Send));
+    /// Has fetched what its ports will touch.
+    fn fetch(&mut self, depth: Depth);
 }
 
 impl<A: Declare> Body for A {
@@ -219,6 +222,9 @@ impl<A: Declare> Body for A {
         if let Some(params) = params.downcast_mut::<A::Params>() {
             Declare::swap_params(self, params);
         }
+    }
+    fn fetch(&mut self, depth: Depth) {
+        Declare::visit_ports(self, &mut |visit| visit.port.fetch(depth));
     }
 }
 

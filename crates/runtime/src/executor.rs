@@ -4,6 +4,7 @@
 //! it says what time it is.
 
 mod change;
+mod due;
 mod ready;
 mod serving;
 mod step;
@@ -17,16 +18,17 @@ use types::{AgentId, Duration, Name, Time};
 
 pub(crate) use change::{Answer, Change, Link, heaps_for};
 
+use self::due::{Due, MANY};
 use self::ready::ReadySet;
 use crate::agent::{Body, Fault};
 use crate::door::{CHANGES, Door};
+use crate::fetch::{Depth, fetch};
 use crate::handover::Running;
 use crate::os;
 use crate::port::{InputEnd, Rest};
 use crate::processor::{Checks, rate};
 use crate::ring::{self, ring};
-use crate::stats::{AgentStats, bump};
-use crate::sync::Ordering;
+use crate::stats::{AgentStats, bump, bump_by};
 
 /// When an agent runs.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -131,7 +133,6 @@ pub(crate) struct Job {
 }
 
 type Releases = BinaryHeap<Reverse<(Time, u32)>>;
-type Due = BinaryHeap<Reverse<(Time, u32, u32, Time)>>;
 
 /// The agents of one executor and what is due among them.
 pub(crate) struct Core {
@@ -155,6 +156,8 @@ pub(crate) struct Core {
 
 /// How many changes or answers can be under way.
 const UNDER_WAY: usize = 1024;
+/// Lines of an agent's own memory that are fetched before its turn.
+const MOST_OF_A_BODY: usize = 4;
 /// Room for alarms besides the one release of each agent.
 const SPARE_ALARMS: usize = 64;
 
@@ -179,7 +182,7 @@ impl Core {
             seats: Vec::new(),
             ready: ReadySet::default(),
             releases: BinaryHeap::with_capacity(SPARE_ALARMS),
-            due: BinaryHeap::new(),
+            due: Due::default(),
             door: door.clone(),
             running: running.clone(),
             changes,
@@ -260,12 +263,45 @@ impl Core {
     #[inline(never)]
     fn next_due(&mut self, now: Time) -> Option<Job> {
         self.collect_due(now);
-        let Reverse((deadline, rank, slot, release)) = self.due.pop()?;
+        let (deadline, rank, slot, release) = self.due.pop()?;
+        self.fetch_coming();
         if let Some(seat) = self.seats.get_mut(slot as usize).and_then(Option::as_deref_mut) {
             seat.is_due = false;
         }
         self.ready.clear(rank);
         Some(Job { slot, release, deadline, by_clock: true })
+    }
+
+    /// Has fetched what the next steps will touch, where it is known whose they are: part by part, each when the one that leads to it
+    /// has come.
+    #[inline]
+    fn fetch_coming(&mut self) {
+        if self.due.coming(0).is_none() {
+            return;
+        }
+        if let Some(seat) = self.coming(8) {
+            fetch(&raw const *seat, size_of::<Seat>().div_ceil(64));
+        }
+        if let Some(seat) = self.coming(6) {
+            seat.stats.fetch();
+            if let Some(body) = &seat.body {
+                fetch(&raw const **body, size_of_val(&**body).div_ceil(64).min(MOST_OF_A_BODY));
+            }
+        }
+        if let Some(seat) = self.coming(4) {
+            seat.stats.fetch_last();
+        }
+        for (after, depth) in [(4, Depth::Ends), (2, Depth::Wires), (0, Depth::Places)] {
+            if let Some(body) = self.coming(after).and_then(|seat| seat.body.as_deref_mut()) {
+                body.fetch(depth);
+            }
+        }
+    }
+
+    #[inline]
+    fn coming(&mut self, after: usize) -> Option<&mut Seat> {
+        let slot = self.due.coming(after)?;
+        self.seats.get_mut(slot as usize)?.as_deref_mut()
     }
 
     /// Whether a message came too soon after the last step. Then there is one step for all that come until it may be.
@@ -292,14 +328,16 @@ impl Core {
                 return;
             }
             self.releases.pop();
+            self.fetch_released();
             let Some(seat) = self.seats.get_mut(slot as usize).and_then(Option::as_mut) else { continue };
             let mut release = None;
             if seat.next_release <= now {
                 // Releases that were passed over are counted and never made up for: no burst.
                 let period = seat.timing.period;
                 let passed = (now - seat.next_release).0 / period.0.max(1);
-                let stats = &seat.stats;
-                stats.skipped.store(stats.skipped.load(Ordering::Relaxed) + passed as u64, Ordering::Relaxed);
+                if passed > 0 {
+                    bump_by(&seat.stats.skipped, passed as u64);
+                }
                 let due = seat.next_release + period * passed;
                 seat.next_release = due + period;
                 release = Some(due);
@@ -324,7 +362,20 @@ impl Core {
                 && !core::mem::replace(&mut seat.is_due, true)
             {
                 let deadline = release.saturating_add(seat.timing.deadline);
-                self.due.push(Reverse((deadline, rank, slot, release)));
+                self.due.push((deadline, rank, slot, release));
+            }
+        }
+    }
+
+    /// Has fetched what the next releases will touch, where there are many: they are near the top.
+    #[inline]
+    fn fetch_released(&self) {
+        if self.releases.len() < MANY {
+            return;
+        }
+        for Reverse((_, slot)) in self.releases.as_slice().iter().take(7) {
+            if let Some(seat) = self.seats.get(*slot as usize).and_then(Option::as_deref) {
+                fetch(&raw const seat.timing, 2);
             }
         }
     }

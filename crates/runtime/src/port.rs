@@ -17,6 +17,7 @@ use std::sync::Arc;
 use types::{AgentId, Filter, Header, Priority};
 
 use crate::door::Door;
+use crate::fetch::Depth;
 use crate::message_type::MessageType;
 use crate::ring::Overload;
 
@@ -131,6 +132,8 @@ pub trait Port {
     fn create(&self, options: &PortOptions, seats: usize) -> PortEnds;
     /// Puts it in front of what [`create`](Self::create) made for the same type.
     fn bind(&mut self, ends: &PortEnds);
+    /// Has fetched what the next message touches, when what lies before it on the way was fetched already.
+    fn fetch(&self, depth: Depth);
 }
 
 /// A port on the way to whoever asks for the ports of an agent.

@@ -19,6 +19,7 @@
 
 use std::sync::Arc;
 
+use crate::fetch::fetch;
 use crate::sync::{AtomicU64, Ordering, UnsafeCell, named};
 
 /// What a sender does when the ring is full.
@@ -77,6 +78,9 @@ fn slot_of(entry: u64) -> u16 {
     (entry >> 1) as u16
 }
 
+/// Lines of a slot that are fetched before it is used.
+const MOST_OF_A_SLOT: usize = 4;
+
 struct Shared<T> {
     entries: Box<[AtomicU64]>,
     slots: Box<[UnsafeCell<T>]>,
@@ -131,6 +135,12 @@ impl<T> End<T> {
         unsafe { (&*self.slots).get_unchecked(usize::from(self.slot)) }
     }
 
+    /// Has the next entry and the own slot fetched.
+    fn fetch(&self) {
+        fetch(self.entry(), 1);
+        fetch(self.place(), size_of::<T>().div_ceil(64).min(MOST_OF_A_SLOT));
+    }
+
     #[inline(always)]
     fn step(&mut self) {
         self.index = if self.index + 1 == self.len() { 0 } else { self.index + 1 };
@@ -154,6 +164,11 @@ pub(crate) fn ring<T: Default + Send>(capacity: usize, displaces: bool) -> (Send
 }
 
 impl<T> Sender<T> {
+    /// Has fetched what the next message touches.
+    pub(crate) fn fetch(&self) {
+        self.0.fetch();
+    }
+
     /// Whether a message can be sent without displacing another.
     #[inline]
     pub(crate) fn has_room(&self) -> bool {
@@ -202,6 +217,11 @@ impl<T> Sender<T> {
 }
 
 impl<T> Receiver<T> {
+    /// Has fetched what the next message touches.
+    pub(crate) fn fetch(&self) {
+        self.0.fetch();
+    }
+
     /// Whether a message waits.
     #[inline]
     pub(crate) fn has_message(&self) -> bool {

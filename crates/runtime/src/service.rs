@@ -6,6 +6,7 @@ use types::cdr::NoElement;
 use types::{AgentId, Category, Duration, Header, Message, Time};
 
 use crate::context::{Context, current};
+use crate::fetch::Depth;
 use crate::message_type::MessageType;
 use crate::port::{
     Direction, Envelope, Input, InputCore, Output, OutputCore, Port, PortEnds, PortOptions, PortShape,
@@ -187,6 +188,11 @@ impl<Q: Message, A: Message> Port for Service<Q, A> {
     fn bind(&mut self, ends: &PortEnds) {
         bind_both(&mut self.calls, &mut self.answers, ends);
     }
+
+    fn fetch(&self, depth: Depth) {
+        self.calls.fetch(depth);
+        self.answers.fetch(depth);
+    }
 }
 
 impl<Q: Message, A: Message> Port for Client<Q, A> {
@@ -201,6 +207,11 @@ impl<Q: Message, A: Message> Port for Client<Q, A> {
 
     fn bind(&mut self, ends: &PortEnds) {
         bind_both(&mut self.answers, &mut self.calls, ends);
+    }
+
+    fn fetch(&self, depth: Depth) {
+        self.calls.fetch(depth);
+        self.answers.fetch(depth);
     }
 }
 

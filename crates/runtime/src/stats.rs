@@ -4,6 +4,8 @@ use core::sync::atomic::{AtomicU32, AtomicU64, Ordering::Relaxed};
 
 use types::Duration;
 
+use crate::fetch::fetch;
+
 /// Steps of the histogram in each doubling.
 const PER_OCTAVE: u32 = 8;
 /// The first step holds all up to this many nanoseconds.
@@ -188,6 +190,22 @@ impl AgentStats {
     /// How long steps used their processor (ns): on the wall clock without what higher executors took from them.
     pub fn exec(&self) -> Figure {
         figure(&[&self.exec, &self.undisturbed])
+    }
+
+    /// Has fetched what a step that is due adds to, but for the step of its histogram.
+    #[inline]
+    pub(crate) fn fetch(&self) {
+        for figure in [&self.exec, &self.jitter, &self.response] {
+            fetch(figure, 1);
+        }
+        fetch(&self.releases, 1);
+    }
+
+    /// And that: most steps take about as long as the one before.
+    #[inline]
+    pub(crate) fn fetch_last(&self) {
+        let last = bucket(self.exec.last.load(Relaxed));
+        fetch(&self.exec.buckets[last], 1);
     }
 
     /// The same as [`Histogram::steps`].

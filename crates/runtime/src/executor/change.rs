@@ -3,7 +3,6 @@
 #![allow(unsafe_code)]
 
 use std::any::Any;
-use std::cmp::Reverse;
 use std::collections::BinaryHeap;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::Arc;
@@ -112,7 +111,7 @@ pub(crate) enum Change {
 
 /// Room in the heaps of an executor of this many agents, for [`Change::Order`].
 pub(crate) fn heaps_for(agents: usize) -> (Releases, Due) {
-    (BinaryHeap::with_capacity(agents * 3 + SPARE_ALARMS), BinaryHeap::with_capacity(agents + SPARE_ALARMS))
+    (BinaryHeap::with_capacity(agents * 3 + SPARE_ALARMS), Due::with_capacity(agents + SPARE_ALARMS))
 }
 
 impl Change {
@@ -282,7 +281,7 @@ impl Core {
                     self.seats.resize_with(*slot as usize + 1, || None);
                 }
                 if let Some(mut new) = seat.take() {
-                    self.due.retain(|Reverse((_, _, known, _))| *known != *slot);
+                    self.due.forget(*slot);
                     if new.timing.period > Duration::ZERO {
                         new.next_release = now;
                         self.push_release(now, *slot);
@@ -299,7 +298,7 @@ impl Core {
                     core::mem::swap(releases, &mut self.releases);
                 }
                 if due.capacity() > self.due.capacity() {
-                    due.extend(self.due.drain());
+                    due.take_over(&mut self.due);
                     core::mem::swap(due, &mut self.due);
                 }
             }
@@ -402,7 +401,7 @@ unsafe fn commit(
             // SAFETY: as above.
             let core = unsafe { &mut *core };
             *seat = core.seats.get_mut(*slot as usize).and_then(Option::take);
-            core.due.retain(|Reverse((_, _, known, _))| *known != *slot);
+            core.due.forget(*slot);
         }
         Change::Body { slot, body, hands_over } => {
             // SAFETY: as above.

@@ -15,6 +15,7 @@ use super::{
     WireId, count, output_core,
 };
 use crate::context::current;
+use crate::fetch::{Depth, fetch};
 use crate::memory::{Found, Link, Pin, Seat};
 use crate::message_type::MessageType;
 use crate::{queue, ring};
@@ -50,6 +51,9 @@ impl<T: Message> Source<T> {
         }
     }
 }
+
+/// Of so many wires of an input it is fetched what the next step will touch.
+const WIRES: usize = 2;
 
 /// The receiving end of one ring of a wire.
 pub(super) struct Lane<T: Message> {
@@ -375,6 +379,16 @@ fn before(a: &Header, b: &Header) -> bool {
 }
 
 impl<T: Message> Lane<T> {
+    /// Has fetched what the next message touches.
+    fn fetch(&self) {
+        fetch(&raw const *self.counts, 2);
+        match &self.source {
+            Source::Value(receiver) => receiver.fetch(),
+            Source::Link(receiver, _) => receiver.fetch(),
+            Source::Queue(_) => {}
+        }
+    }
+
     /// Whether a message waits that nobody else can take.
     fn has_own_message(&self) -> bool {
         self.staged || !matches!(self.source, Source::Queue(_)) && self.source.has_message()
@@ -424,6 +438,15 @@ impl<T: Message> Port for Input<T> {
 
     fn bind(&mut self, ends: &PortEnds) {
         self.core = ends.input.as_ref().and_then(downcast_input);
+    }
+
+    fn fetch(&self, depth: Depth) {
+        let Some(core) = self.core.as_deref() else { return };
+        match depth {
+            Depth::Ends => fetch(core, 1),
+            Depth::Wires => core.inner().lanes.iter().take(WIRES).for_each(|lane| fetch(lane, 2)),
+            Depth::Places => core.inner().lanes.iter().take(WIRES).for_each(Lane::fetch),
+        }
     }
 }
 

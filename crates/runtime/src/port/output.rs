@@ -23,6 +23,7 @@ use super::{
     PreparedWire, WireId, WireSpec, input_core,
 };
 use crate::context::{Context, current};
+use crate::fetch::{Depth, fetch};
 use crate::memory::{self, Seat};
 use crate::message_type::{self, MessageType};
 use crate::ring::{self, Overload};
@@ -31,6 +32,9 @@ pub(super) struct NewRoute<T: Message> {
     pub(super) route: Option<Route<T>>,
     pub(super) room: Vec<Route<T>>,
 }
+
+/// Of so many wires of an output it is fetched what the next message will touch.
+const WIRES: usize = 2;
 
 /// What every message uses stands first, together.
 #[repr(C)]
@@ -563,6 +567,15 @@ impl<T: Message> Port for Output<T> {
 
     fn bind(&mut self, ends: &PortEnds) {
         self.core = ends.output.as_ref().and_then(downcast_output);
+    }
+
+    fn fetch(&self, depth: Depth) {
+        let Some(core) = self.core.as_deref() else { return };
+        match depth {
+            Depth::Ends => fetch(core, 2),
+            Depth::Wires => core.inner().routes.iter().take(WIRES).for_each(|route| fetch(route, 3)),
+            Depth::Places => core.inner().routes.iter().take(WIRES).for_each(Route::fetch),
+        }
     }
 }
 

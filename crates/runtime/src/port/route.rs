@@ -6,6 +6,7 @@ use types::{Filter, Header, Message, Priority};
 
 use super::{Parcel, Target, WireCounts, WireId, count};
 use crate::context::Context;
+use crate::fetch::fetch;
 use crate::memory::Link;
 use crate::queue;
 use crate::ring::{self, Overload, Pushed};
@@ -72,6 +73,15 @@ impl<T: Message> Route<T> {
 
     pub(super) fn leads_to_queue(&self) -> bool {
         matches!(self.way, Way::Queue(_))
+    }
+
+    /// Has fetched what the next message touches.
+    pub(super) fn fetch(&self) {
+        fetch(&raw const *self.counts, 1);
+        match &self.way {
+            Way::Value(ring) => ring.fetch(),
+            Way::Values(_) | Way::Links(_) | Way::Queue(_) => {}
+        }
     }
 
     #[inline]

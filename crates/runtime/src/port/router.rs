@@ -23,6 +23,7 @@ use super::{
 };
 use crate::composition::{Composition, PortAt, PortSeen, QueueSeen};
 use crate::context::current;
+use crate::fetch::Depth;
 use crate::message_type::MessageType;
 use crate::ring::{self, Overload, Pushed};
 use crate::service::{Client, Service, Ticket};
@@ -664,4 +665,7 @@ impl Port for Router {
     fn bind(&mut self, ends: &PortEnds) {
         self.end = router_end(ends);
     }
+
+    /// It is used too seldom.
+    fn fetch(&self, _: Depth) {}
 }

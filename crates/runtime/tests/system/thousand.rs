@@ -7,7 +7,7 @@ use std::time::Instant;
 use runtime::{AgentPlan, Control, Live, Options, Plan, Request, Simulation, WirePlan, registry};
 use types::Duration;
 
-use crate::{Relay, Source, options};
+use crate::{Relay, Source, at, options};
 
 const AGENTS: usize = 1000;
 const ROUNDS: usize = 300;
@@ -99,4 +99,29 @@ fn a_system_of_many_wires_is_made_whole() {
     let silent: Vec<_> = report.view.agents.iter().filter(|agent| agent.counts.releases == 0).collect();
     assert!(silent.is_empty(), "{} agents have no step", silent.len());
     assert_eq!(report.view.wires.len(), plan.wires.len());
+}
+
+/// Agents that are all due at once step in data-flow order, however they stand in the plan: what the first sends is with the last at the
+/// same instant, also after some have gone and come.
+#[test]
+fn of_many_that_are_due_at_once_each_steps_behind_those_it_hears() {
+    const ROW: usize = 150;
+    let mut plan = Plan::new("row");
+    plan.add::<Source>("source", Default::default());
+    for i in 0..ROW {
+        // 77 and 150 share no divisor.
+        plan.add::<Relay>(&format!("relay{}", i * 77 % ROW), Default::default());
+    }
+    for agent in &mut plan.agents {
+        (agent.period, agent.executor) = (Some(Duration::millis(100)), Some("control".into()));
+    }
+    plan.wires.push(WirePlan::new("source.out", "relay0.from"));
+    plan.wires
+        .extend((1..ROW).map(|i| WirePlan::new(format!("relay{}.to", i - 1), format!("relay{i}.from"))));
+    plan.requests = vec![at(450, "restart relay70"), at(730, "remove source")];
+    let report = Simulation::new(&plan, &registry![Source, Relay], options(1000)).unwrap().run().unwrap();
+    // At 0, 100, … 700 ms; nothing is left on the way.
+    for wire in report.view.wires {
+        assert_eq!((wire.sent, wire.taken), (8, 8), "{} to {}", wire.from, wire.to);
+    }
 }
