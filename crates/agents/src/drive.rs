@@ -143,40 +143,53 @@ const TOLD: f64 = 0.05;
 const STILL: f64 = 0.01;
 /// After so long of that it is no lag of the motors: somebody stopped them, or nobody counts them any more.
 const UNANSWERED: Duration = Duration::millis(600);
-/// For so long it then stands, before it tries again, slowly (m/s).
+/// For so long it then stands, and for the last part of that nothing may be heard of a turn (rad/s).
 const PAUSE: Duration = Duration::secs(5);
-const TRY: f64 = 0.1;
+const QUIET: Duration = Duration::secs(1);
+const NO_TURN: f64 = 0.05;
+/// Then it tries to turn on the spot (rad/s), for as long as wheels take to answer: where nobody says how the robot moves, that leads it
+/// nowhere.
+const TRY: f64 = 0.4;
 
 /// Whether the wheels do what they are told.
 #[derive(Clone, Copy, Debug, Default)]
 struct Answer {
     /// Since when they do not.
     told: Option<Time>,
-    /// When they were found not to.
-    broken: Option<Time>,
+    /// Since when the robot stands for that.
+    stands: Option<Time>,
+    /// Since when it tries again.
+    tries: Option<Time>,
 }
 
 impl Answer {
-    /// How fast the robot may go now (m/s), after a command that the wheels answer, or do not, with `motion`.
-    fn allowed(&mut self, commanded: Twist, motion: Option<Twist>, now: Time) -> f64 {
-        let Some(motion) = motion else { return f64::INFINITY };
-        if motion.linear.abs() >= STILL {
+    /// What of a wish is commanded now, after a command that the wheels answer, or do not, with `motion`.
+    fn heeded(&mut self, wanted: Twist, commanded: Twist, motion: Option<Twist>, now: Time) -> Twist {
+        let Some(motion) = motion else { return wanted };
+        let turned = self.tries.is_some() && motion.angular > 0.5 * TRY;
+        if turned || motion.linear.abs() >= STILL {
             *self = Answer::default();
-            return f64::INFINITY;
+            return wanted;
         }
-        if commanded.linear.abs() < TOLD {
-            self.told = None;
-        } else if now - *self.told.get_or_insert(now) > UNANSWERED {
-            if self.broken.is_none() {
+        let Some(stands) = self.stands else {
+            if commanded.linear.abs() < TOLD {
+                self.told = None;
+            } else if now - *self.told.get_or_insert(now) > UNANSWERED {
                 runtime::note!("the wheels are told to turn and do not: standing");
+                self.stands = Some(now);
+                return Twist::ZERO;
             }
-            (self.broken, self.told) = (Some(now), None);
+            return wanted;
+        };
+        match self.tries {
+            Some(since) if now - since > UNANSWERED => (self.stands, self.tries) = (Some(now), None),
+            Some(_) => {}
+            // What tells of a turn while it stands tells nothing by it.
+            None if now - stands > PAUSE - QUIET && motion.angular.abs() > NO_TURN => self.stands = Some(now),
+            None if now - stands > PAUSE && wanted != Twist::ZERO => self.tries = Some(now),
+            None => {}
         }
-        match self.broken {
-            None => f64::INFINITY,
-            Some(broken) if now - broken < PAUSE => 0.0,
-            Some(_) => TRY,
-        }
+        if self.tries.is_some() && wanted != Twist::ZERO { Twist::new(0.0, TRY) } else { Twist::ZERO }
     }
 }
 
@@ -238,13 +251,11 @@ impl Hands {
         let veto = self.veto(params, guarded, now);
         let mut wanted = self.wanted(params, &veto, now);
         let forward = if veto.forward { Forward::Allowed } else { Forward::Forbidden };
-        let answered = self.answer.allowed(self.commanded, self.motion, now);
-        let fastest = veto.linear_max.min(answered);
-        if wanted.linear > fastest {
+        if wanted.linear > veto.linear_max {
             // Slower on the same path.
-            wanted = motion::kinematics::scaled(wanted, fastest.max(0.0) / wanted.linear);
+            wanted = motion::kinematics::scaled(wanted, veto.linear_max.max(0.0) / wanted.linear);
         }
-        wanted.linear = wanted.linear.max(-answered);
+        wanted = self.answer.heeded(wanted, self.commanded, self.motion, now);
         let limited = limit(&params.limits(), wanted, self.commanded, forward, dt);
         self.cuts = limited.cuts;
         self.commanded = match Dated::fresh(&self.reflex, now, params.reflex_hold) {
@@ -317,6 +328,42 @@ mod tests {
     fn words(text: &str) -> Offer {
         let word = word::parse(text).unwrap();
         Offer { word, weight: 1.0, valid_until: at(1000), form: Drive::Linguistic, ..Offer::default() }
+    }
+
+    /// What is commanded in steps of 20 ms while `wheels` say of each command, at its time in ms, how the robot moves.
+    fn driven(millis: i64, wheels: impl Fn(i64, Twist) -> Twist) -> Vec<Twist> {
+        let mut hands = Hands { motion: Some(Twist::new(0.2, 0.0)), ..Hands::default() };
+        (0..millis)
+            .step_by(20)
+            .map(|time| {
+                hands.wish = Some(Dated { value: Twist::new(0.3, 0.2), stamp: at(time) });
+                let command = hands.command(&DriveParams::default(), false, at(time));
+                hands.motion = Some(wheels(time, command));
+                command
+            })
+            .collect()
+    }
+
+    #[test]
+    fn where_nobody_says_how_it_moves_it_drives_for_less_than_a_second_and_then_turns_on_the_spot_now_and_then()
+     {
+        let commands = driven(60_000, |_, _| Twist::ZERO);
+        let way: f64 = commands.iter().map(|command| command.linear * 0.02).sum();
+        assert!((0.1..0.35).contains(&way), "{way} m");
+        assert!(commands[80..].iter().all(|command| command.linear == 0.0));
+        let tries = commands.windows(2).filter(|two| two[0].angular <= 0.0 && two[1].angular > 0.0).count();
+        assert!((9..12).contains(&tries), "{tries} in a minute");
+        // Nor is it moved by one who says at all times that it turns.
+        let commands = driven(60_000, |_, _| Twist::new(0.0, 0.5));
+        assert!(commands[80..].iter().all(|command| *command == Twist::ZERO));
+    }
+
+    #[test]
+    fn wheels_that_answer_again_are_driven_again() {
+        // Locked for ten seconds, as behind a latch that is set.
+        let commands = driven(30_000, |time, told| if time < 10_000 { Twist::ZERO } else { told });
+        assert!(commands[100..500].iter().all(|command| command.linear == 0.0));
+        assert!(commands[900..].iter().all(|command| command.linear > 0.29));
     }
 
     #[test]
