@@ -8,7 +8,7 @@ use types::value::{Table, Value};
 
 use crate::json::{from_json, table_to_json};
 use crate::outbox::Outbox;
-use crate::protocol::{COMMANDS, LONGEST_CALL, Question};
+use crate::protocol::{CALL_WAITS, COMMANDS, LONGEST_CALL, Question};
 use crate::server::Hooks;
 use crate::shapes;
 use crate::taps::{Ear, Taps};
@@ -16,8 +16,6 @@ use crate::words::{self, CHANGES, Pairs};
 
 /// How many decisions are shown when nobody says.
 const DECISIONS: usize = 10;
-/// How long a call waits for its answer when nobody says.
-const CALL_WAITS: types::Duration = types::Duration::secs(2);
 type Answer = Result<Json, Refusal>;
 
 /// Does what clients ask.
@@ -155,7 +153,9 @@ impl Commands {
         let shape = self.control.service(service)?;
         let question = message_of("call", &rest, message)?;
         let question = self.hooks.encode(&shape.question, &question).map_err(Refusal::new)?;
-        let answer = self.control.call(service, question, within)?;
+        let service = service.to_owned();
+        self.hooks.asks(&Request::Call { service: service.clone(), cdr: question.clone(), within });
+        let answer = self.control.call(&service, question, within)?;
         self.hooks.decode(&shape.answer, &answer).map_err(Refusal::new)
     }
 }

@@ -15,6 +15,9 @@ pub const LONGEST_LINE: usize = 1 << 20;
 /// How long a call of a service waits at most: a client that calls can ask nothing else meanwhile.
 pub const LONGEST_CALL: Duration = Duration::secs(60);
 
+/// How long it waits when nobody says.
+pub(crate) const CALL_WAITS: Duration = Duration::secs(2);
+
 /// The commands that ask or do something besides changing agents and wires.
 pub const COMMANDS: [words::Usage; 12] = [
     usage("ls", "ls", "the agents and how they are"),

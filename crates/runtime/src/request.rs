@@ -65,6 +65,16 @@ pub enum Request {
         /// The message.
         cdr: Vec<u8>,
     },
+    /// Calls a service with a question in CDR. It is done when the question is on its way, and stands alone; whoever wants the answer uses
+    /// [`Control::call`](crate::Control::call).
+    Call {
+        /// The service.
+        service: String,
+        /// The question.
+        cdr: Vec<u8>,
+        /// How long the answer is waited for.
+        within: Duration,
+    },
     /// Ends the run.
     Quit,
     /// Several, done together or not at all.

@@ -6,7 +6,7 @@
 //! remove NAME            restart NAME           replace NAME is KIND [KEY=VALUE…]
 //! wire FROM TO [depth=N] [overload=POLICY] [every=N] [priority=LEAST] [marker=N] [category=…] [recipient=AGENT] [serving=N]
 //! unwire FROM TO         set NAME KEY=VALUE…    fault TARGET KIND
-//! send PORT cdr=HEX      quit
+//! send PORT cdr=HEX      call SERVICE cdr=HEX [within=2s]      quit
 //! ```
 //!
 //! Several requests with a `;` between them are one: they are done together or not at all. So is a `set` of several keys.
@@ -38,7 +38,7 @@ const fn usage(verb: &'static str, form: &'static str, does: &'static str) -> Us
 }
 
 /// The requests that change a running system: what [`parse`] reads.
-pub const CHANGES: [Usage; 11] = [
+pub const CHANGES: [Usage; 12] = [
     usage("add", "add NAME is KIND [robot=…] [period=…] [on=…] [KEY=VALUE…]", "adds an agent"),
     usage("add", "add NAME is queue [depth=N] [overload=…]", "adds a queue"),
     usage("remove", "remove NAME", "removes an agent and its wires; or a queue that nobody needs"),
@@ -53,6 +53,7 @@ pub const CHANGES: [Usage; 11] = [
     usage("set", "set NAME KEY=VALUE…", "sets parameters, or the period, deadline or min_gap"),
     usage("fault", "fault AGENT|OUTPUT KIND", "makes an agent or an output misbehave; \"ok\" ends it"),
     usage("send", "send PORT cdr=HEX", "sends a message out of a port"),
+    usage("call", "call SERVICE cdr=HEX [within=2s]", "calls a service, and does not wait for the answer"),
     usage("quit", "quit", "ends the run"),
 ];
 

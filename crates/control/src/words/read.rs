@@ -8,6 +8,7 @@ use types::value::Table;
 use types::{Category, Duration, Priority};
 
 use super::{AND, CHANGES, MOST_PAIRS, QUEUE, WIRE_KEYS, read_value};
+use crate::protocol::{CALL_WAITS, LONGEST_CALL};
 
 /// Longer than anything that robots do. Several such times can be added and each taken four times without an overflow.
 const LONGEST: Duration = Duration::secs(10 * 365 * 24 * 3600);
@@ -67,6 +68,7 @@ fn read_one(words: &[String]) -> Read<Request> {
             Ok(Request::Fault { target, fault })
         }
         "send" => read_send(rest),
+        "call" => read_call(rest),
         "quit" => only(verb, rest).map(|[]| Request::Quit),
         other => Err(Refusal::unknown("request", other, CHANGES.map(|usage| usage.verb))),
     }
@@ -203,8 +205,22 @@ fn read_send(words: &[String]) -> Read<Request> {
         .take("cdr")
         .ok_or_else(|| wrong_form("send", format!("nothing is said of what to send out of {port}")))?;
     pairs.finish("send", &["cdr"])?;
-    let cdr = read_hex(digits).ok_or_else(|| Refusal::new("cdr must be hexadecimal digits, two a byte"))?;
-    Ok(Request::Send { port, cdr })
+    Ok(Request::Send { port, cdr: cdr_of(digits)? })
+}
+
+fn read_call(words: &[String]) -> Read<Request> {
+    let ([service], rest) = begin("call", words)?;
+    let mut pairs = Pairs::read("call", rest)?;
+    let within = pairs.span("within")?.unwrap_or(CALL_WAITS).min(LONGEST_CALL);
+    let digits = pairs
+        .take("cdr")
+        .ok_or_else(|| wrong_form("call", format!("nothing is said of what to ask {service}")))?;
+    pairs.finish("call", &["cdr", "within"])?;
+    Ok(Request::Call { service, cdr: cdr_of(digits)?, within })
+}
+
+fn cdr_of(digits: &str) -> Read<Vec<u8>> {
+    read_hex(digits).ok_or_else(|| Refusal::new("cdr must be hexadecimal digits, two a byte"))
 }
 
 fn read_hex(digits: &str) -> Option<Vec<u8>> {

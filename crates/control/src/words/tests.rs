@@ -111,6 +111,8 @@ fn what_is_refused_says_how_to_mend_it() {
         ("set a", "nothing is said of what to set in a; write: set NAME KEY=VALUE…"),
         ("set a period", "\"period\" is no KEY=VALUE; write: set NAME KEY=VALUE…"),
         ("send a.out cdr=0", "cdr must be hexadecimal digits, two a byte"),
+        ("call a.half cdr=xy", "cdr must be hexadecimal digits, two a byte"),
+        ("call a.half", "nothing is said of what to ask a.half; write: call SERVICE cdr=HEX [within=2s]"),
     ] {
         assert_eq!(read(line).unwrap_err().to_string(), said, "{line}");
     }
@@ -211,6 +213,9 @@ fn single() -> impl Strategy<Value = Request> {
         (port(), prop::sample::select(&FaultKind::ALL[..]))
             .prop_map(|(target, fault)| Request::Fault { target, fault }),
         (port(), vec(any::<u8>(), 0..20)).prop_map(|(port, cdr)| Request::Send { port, cdr }),
+        (port(), vec(any::<u8>(), 0..20), 0i64..=60_000_000_000).prop_map(|(service, cdr, within)| {
+            Request::Call { service, cdr, within: Duration::nanos(within) }
+        }),
         Just(Request::Quit),
     ]
 }

@@ -25,9 +25,9 @@ pub fn words_of(request: &Request) -> Vec<String> {
         Request::Unwire { from, to } => words(["unwire", from, to]),
         Request::Set { agent, key, value } => words(["set", agent, &format!("{key}={}", write_value(value))]),
         Request::Fault { target, fault } => words(["fault", target, fault.name()]),
-        Request::Send { port, cdr } => {
-            let digits: String = cdr.iter().map(|byte| format!("{byte:02x}")).collect();
-            words(["send", port, &format!("cdr={digits}")])
+        Request::Send { port, cdr } => words(["send", port, &digits(cdr)]),
+        Request::Call { service, cdr, within } => {
+            words(["call", service, &digits(cdr), &format!("within={within}")])
         }
         Request::Quit => words(["quit"]),
         Request::All(requests) => {
@@ -35,6 +35,11 @@ pub fn words_of(request: &Request) -> Vec<String> {
             several.join(&AND.to_owned())
         }
     }
+}
+
+fn digits(cdr: &[u8]) -> String {
+    let digits: String = cdr.iter().map(|byte| format!("{byte:02x}")).collect();
+    format!("cdr={digits}")
 }
 
 fn words<const N: usize>(words: [&str; N]) -> Vec<String> {

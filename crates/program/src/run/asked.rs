@@ -296,7 +296,7 @@ impl Repeat {
                         "{name}: what was asked {} after the start cannot be repeated: {said}",
                         message.time.since_start()
                     ))
-                    .help("calls of services from outside cannot be repeated")
+                    .help("is it the log of a run by an older program?")
                 })?;
                 asked.push((message.time, words));
             }
@@ -414,7 +414,19 @@ mod tests {
             // Whatever an agent is called: in a repeated run it asks again by itself.
             assert_eq!(asked.told(who, "asked the router: wire a.b c.d"), None);
         }
-        assert_eq!(understood("Call { service: \"a.b\" }"), None);
+        assert_eq!(understood("Send { port: \"a.b\" }"), None);
+    }
+
+    #[test]
+    fn a_call_from_outside_is_written_down_in_words_that_are_read_again() {
+        let asked = Asked::default();
+        let call =
+            Request::Call { service: "a.half".into(), cdr: vec![0, 255], within: Duration::millis(1500) };
+        asked.asks(&call);
+        let told = asked.told(OUTSIDE, &format!("asked: {call:?}")).unwrap();
+        assert_eq!(told, "asked: call a.half cdr=00ff within=1500ms");
+        let words = understood(told.strip_prefix(ASKED).unwrap()).unwrap();
+        assert_eq!(format!("{:?}", words::parse(&words).unwrap()), format!("{call:?}"));
     }
 
     #[test]

@@ -10,7 +10,7 @@
 //! Each call has ends of its own and a number of its own as sender, so no answer is taken for another, however late it comes.
 
 use std::sync::Arc;
-use std::sync::mpsc::SyncSender;
+use std::sync::mpsc::{SyncSender, sync_channel};
 
 use types::definition::Definition;
 use types::{AgentId, Category, Duration, Filter, Priority, Time};
@@ -22,7 +22,7 @@ use crate::port::{
     Direction, Envelope, InputEnd, NoSeat, OutputEnd, PortEnds, PreparedWire, Target, WireCounts, WireId,
     WireSpec,
 };
-use crate::request::Refusal;
+use crate::request::{Refusal, Request};
 use crate::ring::Overload;
 use crate::service::answers_for;
 
@@ -50,9 +50,16 @@ pub(crate) struct OutsideCall {
 }
 
 impl OutsideCall {
-    /// What is asked, for the log.
+    /// One whose answer nobody waits for.
+    pub(super) fn unheard(service: String, cdr: Vec<u8>, within: Duration) -> OutsideCall {
+        let (asker, _) = sync_channel(1);
+        OutsideCall { service, cdr, within, asker }
+    }
+
+    /// What is asked, for the log: as of the request that it is.
     pub(crate) fn said(&self) -> String {
-        format!("Call {{ service: {:?}, cdr: {:?}, within: {} }}", self.service, self.cdr, self.within)
+        let (service, cdr) = (self.service.clone(), self.cdr.clone());
+        format!("{:?}", Request::Call { service, cdr, within: self.within })
     }
 }
 

@@ -2,13 +2,16 @@
 
 use types::Time;
 
-use super::{Fabric, Reply, Router, Staged, timing_of};
+use super::{Fabric, OutsideCall, Reply, Router, Staged, timing_of};
 use crate::plan::WirePlan;
-use crate::request::Request;
+use crate::request::{Refusal, Request};
 
 impl Router {
     /// Checks a request and does it whole, or refuses it.
     pub(crate) fn apply(&mut self, request: Request, now: Time, fabric: &mut dyn Fabric) -> Reply<()> {
+        if let Request::Call { service, cdr, within } = request {
+            return self.call(OutsideCall::unheard(service, cdr, within), now, fabric);
+        }
         self.now = now;
         let mut concerned = Vec::new();
         self.concerned(&request, &mut concerned);
@@ -58,7 +61,7 @@ impl Router {
             }
             Request::Send { port, .. } => executors.extend(of(port)),
             Request::All(requests) => requests.iter().for_each(|request| self.concerned(request, executors)),
-            Request::Queue(_) | Request::Quit => {}
+            Request::Queue(_) | Request::Call { .. } | Request::Quit => {}
         }
     }
 
@@ -75,6 +78,10 @@ impl Router {
             Request::Set { agent, key, value } => self.set(&agent, &key, value, staged),
             Request::Fault { target, fault } => self.fault(&target, fault, staged),
             Request::Send { port, cdr } => self.send(&port, &cdr, staged),
+            Request::Call { service, .. } => {
+                Err(Refusal::new(format!("a call of {service} cannot be done together with other requests"))
+                    .help("ask for it alone"))
+            }
             Request::Quit => Ok(()),
             Request::All(requests) => {
                 requests.into_iter().try_for_each(|request| self.stage(request, staged))

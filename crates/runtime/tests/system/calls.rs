@@ -34,7 +34,7 @@ fn run(plan: &Plan, work: impl FnOnce(&Control) + Send + 'static) -> Report {
     report
 }
 
-fn cdr(twist: Twist) -> Vec<u8> {
+pub(crate) fn cdr(twist: Twist) -> Vec<u8> {
     let mut out = Writer::new();
     twist.encode(&[], Time::ZERO, &mut out);
     out.bytes().to_vec()
@@ -182,4 +182,29 @@ fn a_service_answers_on_the_wall_clock_too() {
     });
     live.run().unwrap();
     outside.join().unwrap();
+}
+
+/// What somebody asks from outside can be asked in a plan, so that a run can be repeated: the service steps, and no end is left over.
+#[test]
+fn a_plan_calls_a_service_as_somebody_from_outside_does() {
+    let mut plan = plan("planned calls");
+    plan.requests = vec![
+        at(103, "call answerer.half 3"),
+        at(107, "call answerer.quarter 3"),
+        at(111, "call answerer.half 3 ; quit"),
+        at(203, "fault answerer off"),
+        at(205, "call answerer.half 4"),
+        at(303, "fault answerer ok"),
+    ];
+    let report = Simulation::new(&plan, &types(), options(500)).unwrap().run().unwrap();
+    let answerer = report.view.agents.iter().find(|agent| agent.name == "answerer").unwrap();
+    assert_eq!(answerer.counts.releases, 2);
+    assert!(report.view.wires.is_empty());
+    let said: Vec<&str> = report.incidents.iter().map(|incident| incident.what.as_str()).collect();
+    let told = |what: &str| said.iter().filter(|said| said.contains(what)).count();
+    assert_eq!(
+        (told("refused"), told("no service of answerer \"quarter\""), told("together")),
+        (2, 1, 1),
+        "{said:?}"
+    );
 }

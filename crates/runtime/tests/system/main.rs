@@ -128,6 +128,14 @@ fn parse(words: &[String]) -> Result<Request, Refusal> {
             period: Some(Duration::millis(10)),
             ..AgentPlan::default()
         }),
+        ["call", service, speed] => Request::Call {
+            service: service.into(),
+            cdr: calls::cdr(Twist::new(speed.parse().map_err(|_| Refusal::new("no number"))?, 0.0)),
+            within: Duration::millis(50),
+        },
+        ["call", service, speed, ";", "quit"] => {
+            Request::All(vec![parse(&["call", service, speed].map(str::to_owned))?, Request::Quit])
+        }
         ["queue", name] => Request::Queue(QueuePlan::new(name)),
         ["remove", agent] => Request::Remove(agent.into()),
         ["restart", agent] => Request::Restart(agent.into()),
