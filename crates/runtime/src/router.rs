@@ -22,7 +22,7 @@ mod tests;
 mod view;
 mod wires;
 
-use std::collections::{BTreeMap, BTreeSet, HashMap};
+use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 
 use types::value::Table;
@@ -199,7 +199,8 @@ pub(crate) struct Router {
     name: String,
     registry: Registry,
     agents: BTreeMap<AgentId, Known>,
-    names: HashMap<String, AgentId>,
+    /// In the order of names: agents that are free to go first in the data flow go so.
+    names: BTreeMap<String, AgentId>,
     wires: BTreeMap<WireId, Wire>,
     queues: Vec<queues::Queue>,
     asking: asking::Asking,
@@ -242,7 +243,7 @@ impl Router {
             name: name.to_owned(),
             registry,
             agents: BTreeMap::new(),
-            names: HashMap::new(),
+            names: BTreeMap::new(),
             wires: BTreeMap::new(),
             queues: Vec::new(),
             asking: asking::Asking::default(),
@@ -314,6 +315,12 @@ impl Router {
         self.names.get(name).copied().ok_or_else(|| {
             Refusal::unknown("agent", name, self.in_order().into_iter().map(|agent| agent.plan.name.as_str()))
         })
+    }
+
+    /// The agent of this name, or that of this port, where there is one: who only looks needs no words for that there is none.
+    fn owner_of(&self, name: &str) -> Option<&Known> {
+        let agent = self.names.get(name).or_else(|| self.names.get(name.rsplit_once('.')?.0))?;
+        self.by_id(*agent)
     }
 
     fn known(&self, name: &str) -> Reply<&Known> {

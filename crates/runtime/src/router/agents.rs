@@ -342,7 +342,7 @@ impl Router {
     }
 
     pub(super) fn fault(&mut self, target: &str, fault: FaultKind, staged: &mut Staged) -> Reply<()> {
-        if let Ok(id) = self.id_of(target) {
+        if let Some(id) = self.names.get(target).copied() {
             let step = fault.of_step();
             if step.is_none() || fault == FaultKind::Ok {
                 let output = fault.of_output().unwrap_or_default();

@@ -26,12 +26,10 @@ impl Router {
 
     /// The slots of an executor's agents so that senders stand before receivers; cycles are broken by name.
     pub(super) fn data_flow_order(&self, executor: usize) -> Vec<u32> {
-        let slots = &self.executors[executor].slots;
-        let known = slots.iter().flatten().filter_map(|id| self.agents.get(id));
-        let mut members: Vec<(&str, &Known)> = known.map(|known| (known.plan.name.as_str(), known)).collect();
-        members.sort_unstable_by_key(|(name, _)| *name);
-        let mut place = vec![usize::MAX; slots.len()];
-        for (i, (_, member)) in members.iter().enumerate() {
+        let known = self.names.values().filter_map(|id| self.agents.get(id));
+        let members: Vec<&Known> = known.filter(|known| known.executor == executor).collect();
+        let mut place = vec![usize::MAX; self.executors[executor].slots.len()];
+        for (i, member) in members.iter().enumerate() {
             place[member.slot as usize] = i;
         }
         let mut flow = Flow::of(members.len());
@@ -43,7 +41,7 @@ impl Router {
                 flow.add(place[from.slot as usize], place[to.slot as usize]);
             }
         };
-        for (_, member) in &members {
+        for member in &members {
             let wires = member.wires.iter().filter_map(|id| self.wires.get(id));
             let wires = wires.filter(|wire| wire.from.0 == member.id && !wire.is_answer);
             wires.for_each(|wire| goes_before(member, wire.to.0));
@@ -52,7 +50,7 @@ impl Router {
             let from = self.agents.get(&from).filter(|from| from.executor == executor);
             from.into_iter().for_each(|from| goes_before(from, to));
         }
-        flow.in_order().map(|place| members[place].1.slot).collect()
+        flow.in_order().map(|place| members[place].slot).collect()
     }
 }
 

@@ -35,13 +35,13 @@ impl Router {
 
     /// The executors that have to do with a request.
     fn concerned(&self, request: &Request, executors: &mut Vec<usize>) {
-        let of = |port: &str| self.port(port).ok().map(|(agent, _)| self.agents[&agent].executor);
+        let of = |name: &str| self.owner_of(name).map(|known| known.executor);
         match request {
             Request::Wire(WirePlan { from, to, .. }) | Request::Unwire { from, to } => {
                 executors.extend([of(from), of(to)].into_iter().flatten());
             }
             Request::Remove(name) => {
-                let Ok(known) = self.known(name) else { return };
+                let Some(known) = self.owner_of(name) else { return };
                 executors.push(known.executor);
                 let wires = known.wires.iter().filter_map(|id| self.wires.get(id));
                 let ends = wires.flat_map(|wire| [wire.from.0, wire.to.0]);
@@ -53,13 +53,11 @@ impl Router {
                 let robot = self.robot_wires(plan);
                 executors.extend(robot.iter().flat_map(|wire| [of(&wire.from), of(&wire.to)]).flatten());
             }
-            Request::Restart(agent) | Request::Replace { agent, .. } | Request::Set { agent, .. } => {
-                executors.extend(self.known(agent).map(|known| known.executor));
-            }
-            Request::Fault { target, .. } => {
-                executors.extend(self.known(target).map(|known| known.executor).ok().or_else(|| of(target)));
-            }
-            Request::Send { port, .. } => executors.extend(of(port)),
+            Request::Restart(target)
+            | Request::Replace { agent: target, .. }
+            | Request::Set { agent: target, .. }
+            | Request::Fault { target, .. }
+            | Request::Send { port: target, .. } => executors.extend(of(target)),
             Request::All(requests) => requests.iter().for_each(|request| self.concerned(request, executors)),
             Request::Queue(_) | Request::Call { .. } | Request::Quit => {}
         }
