@@ -1,5 +1,7 @@
 //! All mistakes of a plan at once, without running anything.
 
+use std::collections::HashMap;
+
 use types::value::{Mistake, Span};
 
 use crate::agent::{AgentType, Registry};
@@ -12,7 +14,11 @@ use crate::router::{robot_wires, timing_of};
 
 /// All mistakes of a plan, in the order of the file as far as places are known.
 pub fn check(plan: &Plan, registry: &Registry) -> Vec<Mistake> {
-    let mut checker = Checker { plan, registry, mistakes: Vec::new() };
+    let mut agents = HashMap::with_capacity(plan.agents.len());
+    for agent in &plan.agents {
+        agents.entry(agent.name.as_str()).or_insert(agent);
+    }
+    let mut checker = Checker { plan, agents, registry, mistakes: Vec::new() };
     checker.executors();
     checker.agents();
     checker.queues();
@@ -52,6 +58,8 @@ pub fn wires_of(plan: &Plan, registry: &Registry) -> Vec<WirePlan> {
 
 struct Checker<'a> {
     plan: &'a Plan,
+    /// The first of each name.
+    agents: HashMap<&'a str, &'a AgentPlan>,
     registry: &'a Registry,
     mistakes: Vec<Mistake>,
 }
@@ -78,8 +86,8 @@ impl<'a> Checker<'a> {
 
     fn agents(&mut self) {
         let executors = executors_of(self.plan);
-        for (i, agent) in self.plan.agents.iter().enumerate() {
-            if self.plan.agents[..i].iter().any(|other| other.name == agent.name) {
+        for agent in &self.plan.agents {
+            if self.agents.get(agent.name.as_str()).is_some_and(|first| !core::ptr::eq(*first, agent)) {
                 self.say(agent.at, format!("there are two agents \"{}\"", agent.name));
             }
             if let Some(name) = &agent.executor
@@ -118,7 +126,7 @@ impl<'a> Checker<'a> {
             );
             return None;
         };
-        let Some(agent) = self.plan.agent(agent_name) else {
+        let Some(agent) = self.agents.get(agent_name).copied() else {
             let known = self.plan.agents.iter().map(|agent| agent.name.as_str());
             self.mistakes.push(Mistake::unknown(at, "agent", agent_name, known));
             return None;
@@ -139,7 +147,7 @@ impl<'a> Checker<'a> {
             if self.plan.queues[..i].iter().any(|other| other.name == *name) {
                 self.say(queue.at, format!("there are two queues \"{name}\""));
             }
-            if self.plan.agent(name).is_some() {
+            if self.agents.contains_key(name.as_str()) {
                 self.say(queue.at, format!("\"{name}\" is an agent and a queue; names are given once"));
             }
             if let Err(refusal) = queue.check() {
@@ -161,7 +169,7 @@ impl<'a> Checker<'a> {
                 _ => return None,
             };
             let (agent, port) = port.rsplit_once('.')?;
-            let shape = self.registry.get(&self.plan.agent(agent)?.kind)?.port(port)?.shape;
+            let shape = self.registry.get(&self.agents.get(agent)?.kind)?.port(port)?.shape;
             let message = if is_sender { shape.output } else { shape.input };
             message.filter(|message| !message.large)
         })
@@ -188,7 +196,7 @@ impl<'a> Checker<'a> {
 
     fn wire(&mut self, wire: &WirePlan) {
         if let Some(name) = &wire.filter.recipient
-            && self.plan.agent(name).is_none()
+            && !self.agents.contains_key(name.as_str())
         {
             let known = self.plan.agents.iter().map(|agent| agent.name.as_str());
             self.mistakes.push(Mistake::unknown(wire.at, "agent", name, known));

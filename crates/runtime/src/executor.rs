@@ -16,7 +16,7 @@ use std::sync::Arc;
 
 use types::{AgentId, Duration, Name, Time};
 
-pub(crate) use change::{Answer, Change, Link, heaps_for};
+pub(crate) use change::{Answer, Change, Link, Room};
 
 use self::due::{Due, MANY};
 use self::ready::ReadySet;

@@ -4,8 +4,8 @@
 #![allow(unsafe_code)]
 
 use core::sync::atomic::{AtomicBool, AtomicU64, Ordering};
-use std::collections::BTreeMap;
 use std::collections::btree_map::Entry;
+use std::collections::{BTreeMap, HashMap};
 use std::sync::{Arc, Mutex, PoisonError};
 
 use types::cdr::Writer;
@@ -61,6 +61,24 @@ pub(crate) struct Topics {
     pub taps: Vec<(u32, Tap)>,
     /// For each output, every how many messages the recorder gets one.
     pub every: Vec<u32>,
+    /// The numbers of each name: one for each type of message that it ever had.
+    numbers: HashMap<String, Vec<u32>>,
+}
+
+impl Topics {
+    /// The number of an output, the same as before where one of that name and type was there before; else a new one, of which the recorder
+    /// gets one message of `every`.
+    pub(crate) fn number_of(&mut self, name: String, message: &'static MessageType, every: u32) -> u32 {
+        let known = self.numbers.get(&name).into_iter().flatten();
+        if let Some(number) = known.copied().find(|number| self.outputs[*number as usize].1 == message) {
+            return number;
+        }
+        let number = self.outputs.len() as u32;
+        self.numbers.entry(name.clone()).or_default().push(number);
+        self.outputs.push((name, message));
+        self.every.push(every);
+        number
+    }
 }
 
 /// What the log thread is told by others.

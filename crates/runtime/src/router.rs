@@ -168,6 +168,8 @@ pub(crate) struct ExecutorKnown {
     pub granted: String,
     /// Who sits where. A place is free when the executor has let go of it.
     slots: Vec<Option<AgentId>>,
+    /// For how many agents it was given room.
+    room: usize,
     /// The number of the last change to which it has answered.
     answered: u64,
     /// What that was when it was last told that there is room for more answers.
@@ -404,7 +406,15 @@ impl ExecutorKnown {
     }
 
     pub(crate) fn new(plan: ExecutorPlan, link: Link) -> ExecutorKnown {
-        ExecutorKnown { plan, link, granted: "simulated".into(), slots: Vec::new(), answered: 0, rung_at: 0 }
+        ExecutorKnown {
+            plan,
+            link,
+            granted: "simulated".into(),
+            slots: Vec::new(),
+            room: 0,
+            answered: 0,
+            rung_at: 0,
+        }
     }
 }
 

@@ -29,8 +29,6 @@ pub(crate) enum Change {
     Seat {
         slot: u32,
         seat: Option<Box<Seat>>,
-        seats: Vec<Option<Box<Seat>>>,
-        room: usize,
     },
     Unseat {
         slot: u32,
@@ -40,8 +38,7 @@ pub(crate) enum Change {
         order: Vec<u32>,
         ranks: Vec<u32>,
         words: Vec<u64>,
-        releases: Releases,
-        due: Due,
+        room: Option<Box<Room>>,
     },
     Join {
         end: Arc<dyn InputEnd>,
@@ -109,9 +106,32 @@ pub(crate) enum Change {
     Stop,
 }
 
-/// Room in the heaps of an executor of this many agents, for [`Change::Order`].
-pub(crate) fn heaps_for(agents: usize) -> (Releases, Due) {
-    (BinaryHeap::with_capacity(agents * 3 + SPARE_ALARMS), Due::with_capacity(agents + SPARE_ALARMS))
+/// Room for the agents of an executor, where they have become more than it had room for.
+pub(crate) struct Room {
+    seats: Vec<Option<Box<Seat>>>,
+    releases: Releases,
+    due: Due,
+}
+
+impl Room {
+    pub(crate) fn of(agents: usize) -> Room {
+        Room {
+            seats: Vec::with_capacity(agents),
+            releases: BinaryHeap::with_capacity(agents * 3 + SPARE_ALARMS),
+            due: Due::with_capacity(agents + SPARE_ALARMS),
+        }
+    }
+
+    /// Exchanges it for what an executor has. What was that goes back, to be freed elsewhere.
+    fn exchange(&mut self, core: &mut Core) {
+        self.seats.append(&mut core.seats);
+        core::mem::swap(&mut self.seats, &mut core.seats);
+        // One by one: `append` would exchange the two when this one is longer, and the room would go back.
+        self.releases.extend(core.releases.drain());
+        core::mem::swap(&mut self.releases, &mut core.releases);
+        self.due.take_over(&mut core.due);
+        core::mem::swap(&mut self.due, &mut core.due);
+    }
 }
 
 impl Change {
@@ -140,6 +160,7 @@ impl Change {
 }
 
 /// What an executor tells the control side.
+#[allow(clippy::large_enum_variant)] // what is known of a death comes without memory of its own
 pub(crate) enum Answer {
     /// With the number of the change, as of the others.
     Done(u64, Change),
@@ -272,11 +293,7 @@ impl Core {
     /// Does what needs nobody else's code. False for a wire that still has messages: it is not cut yet.
     fn commit(&mut self, change: &mut Change, context: &Context, now: Time) -> bool {
         match change {
-            Change::Seat { slot, seat, seats, room } => {
-                if self.seats.capacity() < *room {
-                    seats.append(&mut self.seats);
-                    core::mem::swap(&mut self.seats, seats);
-                }
+            Change::Seat { slot, seat } => {
                 if self.seats.len() <= *slot as usize {
                     self.seats.resize_with(*slot as usize + 1, || None);
                 }
@@ -290,16 +307,10 @@ impl Core {
                     self.note_serving(*slot);
                 }
             }
-            Change::Order { order, ranks, words, releases, due } => {
+            Change::Order { order, ranks, words, room } => {
                 self.ready.set_order(order, ranks, words);
-                if releases.capacity() > self.releases.capacity() {
-                    // One by one: `append` would exchange the two when this one is longer, and the room would go back.
-                    releases.extend(self.releases.drain());
-                    core::mem::swap(releases, &mut self.releases);
-                }
-                if due.capacity() > self.due.capacity() {
-                    due.take_over(&mut self.due);
-                    core::mem::swap(due, &mut self.due);
+                if let Some(room) = room {
+                    room.exchange(self);
                 }
             }
             Change::Join { end, lanes, slot } => {

@@ -92,7 +92,6 @@ impl Router {
 
     /// Puts an agent on its seat, with a body or without.
     pub(super) fn seat_step(&self, known: &Known, body: Option<Box<dyn Body>>) -> Step {
-        let room = self.executors[known.executor].slots.len();
         let seat = Seat {
             id: known.id,
             name: Name::new(&known.plan.name),
@@ -112,8 +111,7 @@ impl Router {
             fault: known.fault,
             lost: false,
         };
-        let seats = Vec::with_capacity((room * 2).max(8));
-        let change = Change::Seat { slot: known.slot, seat: Some(Box::new(seat)), seats, room };
+        let change = Change::Seat { slot: known.slot, seat: Some(Box::new(seat)) };
         Step { executor: known.executor, of: known.id, ring: None, what: What::Change(change) }
     }
 
@@ -124,17 +122,9 @@ impl Router {
             let Some(output) = &made.output else { continue };
             let name = format!("{agent}.{}", port.name);
             let every = self.log.every(&name, output.message_type());
-            let known = topics
-                .outputs
-                .iter()
-                .position(|(known, message)| *known == name && *message == output.message_type());
-            let number = known.unwrap_or_else(|| {
-                topics.outputs.push((name, output.message_type()));
-                topics.every.push(every);
-                topics.outputs.len() - 1
-            });
-            let tapped = topics.taps.iter().any(|(tapped, _)| *tapped == number as u32);
-            output.set_log(number as u32, if tapped { 1 } else { every });
+            let number = topics.number_of(name, output.message_type(), every);
+            let tapped = topics.taps.iter().any(|(tapped, _)| *tapped == number);
+            output.set_log(number, if tapped { 1 } else { every });
         }
     }
 

@@ -140,9 +140,9 @@ impl Router {
             self.say_of(id, format!("left dead, for it cannot be built: {refusal}"));
             return;
         }
-        let known = &self.agents[&id];
+        let order = self.order_step(self.agents[&id].executor);
         // What stands ready for the next hand-over is used up.
-        let mut steps = vec![self.order_step(known.executor), self.seat_step(known, None)];
+        let mut steps = vec![order, self.seat_step(&self.agents[&id], None)];
         for old in touching {
             let mut wire = Wire { ring: self.wire_id(), counts: Default::default(), ..old.clone() };
             match self.connect(&wire) {

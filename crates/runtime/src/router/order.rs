@@ -7,20 +7,28 @@ use types::AgentId;
 
 use super::script::{Step, What};
 use super::{Known, Router};
-use crate::executor::{Change, heaps_for};
+use crate::executor::{Change, Room};
+
+/// An executor has room for so many agents at least.
+const LEAST_ROOM: usize = 8;
 
 impl Router {
-    /// Gives an executor its data-flow order.
-    pub(super) fn order_step(&self, executor: usize) -> Step {
+    /// Gives an executor its data-flow order, and room for its agents where they have become more. It is given what is said here: the step
+    /// may not be dropped.
+    pub(super) fn order_step(&mut self, executor: usize) -> Step {
         let order = self.data_flow_order(executor);
-        let slots = self.executors[executor].slots.len();
+        let known = &mut self.executors[executor];
+        let slots = known.slots.len();
+        let room = (slots > known.room).then(|| {
+            known.room = slots.next_power_of_two().max(LEAST_ROOM);
+            Box::new(Room::of(known.room))
+        });
         let mut ranks = vec![u32::MAX; slots];
         for (rank, slot) in order.iter().enumerate() {
             ranks[*slot as usize] = rank as u32;
         }
         let words = vec![0; slots.div_ceil(64).max(1)];
-        let (releases, due) = heaps_for(slots);
-        let change = Change::Order { order, ranks, words, releases, due };
+        let change = Change::Order { order, ranks, words, room };
         Step { executor, of: AgentId::NONE, ring: None, what: What::Change(change) }
     }
 
