@@ -10,6 +10,7 @@
 use motion::fusion::{self, Cause, Held, Moment, Veto, fuse};
 use motion::kinematics::{Differential, is_finite};
 use motion::limits::{Cuts, Forward, Limits, limit};
+use motion::safety::aged;
 use runtime::{Agent, Fault, Input, Output, Step};
 use types::messages::{Odometry, Offer, Safety, Twist};
 use types::params::Params;
@@ -53,6 +54,10 @@ pub struct DriveParams {
     /// A verdict of the safety monitor older than this forbids to move forward (time). 700 ms is two missed readings of a sonar at 4 Hz.
     #[param(default = Duration::millis(700), min = 0.01, max = 60.0)]
     pub safety_age: Duration,
+    /// After so long a new verdict was due: from then on the old one allows less and less, as braking makes it (time). 300 ms is a period of a
+    /// sonar at 4 Hz and a step of the drive.
+    #[param(default = Duration::millis(300), min = 0.01, max = 60.0)]
+    pub safety_due: Duration,
     /// How long a reflex bounds the motion (time). 300 ms outlasts one period of a sonar at 4 Hz.
     #[param(default = Duration::millis(300), min = 0.0, max = 10.0)]
     pub reflex_hold: Duration,
@@ -283,11 +288,12 @@ impl Hands {
 
     fn veto(&self, params: &DriveParams, guarded: bool, now: Time) -> Veto {
         match Dated::fresh(&self.safety, now, params.safety_age) {
-            Some(safety) => Veto {
-                forward: !safety.blind && safety.linear_max > 0.0,
-                linear_max: safety.linear_max,
-                wider: safety.wider,
-            },
+            Some(safety) => {
+                let age = self.safety.map_or(Duration::ZERO, |heard| now - heard.stamp);
+                let due = params.safety_due.seconds();
+                let linear_max = aged(safety.linear_max, age.seconds(), due, params.deceleration);
+                Veto { forward: !safety.blind && linear_max > 0.0, linear_max, wider: safety.wider }
+            }
             None if guarded => Veto { forward: false, ..Veto::NONE },
             None => Veto::NONE,
         }
@@ -356,6 +362,22 @@ mod tests {
         // Nor is it moved by one who says at all times that it turns.
         let commands = driven(60_000, |_, _| Twist::new(0.0, 0.5));
         assert!(commands[80..].iter().all(|command| *command == Twist::ZERO));
+    }
+
+    #[test]
+    fn a_verdict_that_no_newer_one_follows_allows_less_and_less() {
+        let allowed = |age| {
+            let safety = Safety { linear_max: 0.4, ..Safety::default() };
+            let hands = Hands { safety: dated(safety), ..Hands::default() };
+            let veto = hands.veto(&DriveParams::default(), true, at(age));
+            (veto.forward, (veto.linear_max * 1000.0).round())
+        };
+        // From 0.3 s on it brakes by 1 m/s².
+        assert_eq!(
+            [0, 300, 400, 650].map(allowed),
+            [(true, 400.0), (true, 400.0), (true, 300.0), (true, 50.0)]
+        );
+        assert_eq!([701, 5000].map(|age| allowed(age).0), [false, false]);
     }
 
     #[test]

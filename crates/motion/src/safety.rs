@@ -85,6 +85,12 @@ pub fn speed_to_stop_within(way: f64, reaction: f64, deceleration: f64) -> f64 {
     if way > 0.0 { sqrt(lost * lost + 2.0 * deceleration * way) - lost } else { 0.0 }
 }
 
+/// What is left (m/s) of a `speed` that was judged to be safe `age` (s) ago, when a new word of it was due after `due` (s): nobody has
+/// looked since, so the robot brakes with `deceleration` (m/s²), as it was counted on.
+pub fn aged(speed: f64, age: f64, due: f64, deceleration: f64) -> f64 {
+    fmax(speed - deceleration * fmax(age - due, 0.0), 0.0)
+}
+
 /// Judges a reading.
 ///
 /// `raw` is the ring as it was measured, `filtered` after the sensor's filter. The filtered one sets the speed with the margin; the raw

@@ -33,7 +33,7 @@ const OF_OUTPUTS: [&str; 6] = ["off", "stuck", "garbage", "wrong", "delayed", "i
 const OF_STEPS: [&str; 3] = ["slow", "panic", "hang"];
 
 /// What did lead to a touch once: always tried, each with the seeds that showed it.
-const KNOWN: [(&str, &str, &str); 7] = [
+const KNOWN: [(&str, &str, &str); 10] = [
     ("drive", "stuck", "14..15"),
     ("drive", "stuck", "21..23"),
     ("coordinator", "stuck", "15..15"),
@@ -41,6 +41,9 @@ const KNOWN: [(&str, &str, &str); 7] = [
     ("odometry", "intermittent", "3..3"),
     ("h1.sonar", "wrong", "10..15"),
     ("wall", "wrong", "3..3"),
+    ("h1", "stuck", "2..2"),
+    ("safety", "slow", "4..4"),
+    ("sonar", "wrong", "15..15"),
 ];
 /// A robot that has not moved for so long has given up, and its run is over.
 const PATIENCE: &str = "60s";
