@@ -470,9 +470,11 @@ impl Visit<'_> {
             core.running.limit.store(seat.timing.hang_after.0 as u64, Ordering::Relaxed);
             core.running.since.store(os::ticks(), Ordering::Relaxed);
             core.running.agent.store(seat.id.0, Ordering::Relaxed);
-            core.running.begin(core.running.count().wrapping_add(1), slot);
             let step = Step { now: self.now, deadline: self.now, agent: seat.id, period: seat.timing.period };
-            (step, Arc::as_ptr(&core.running))
+            // From here on the core may be another thread's.
+            let running = Arc::as_ptr(&core.running);
+            core.running.begin(core.running.count().wrapping_add(1), slot);
+            (step, running)
         };
         let before = allocations::so_far();
         let result = catch_unwind(AssertUnwindSafe(|| work(&mut step)));
