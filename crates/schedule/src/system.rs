@@ -1,0 +1,392 @@
+//! Agents that share threads, and make each other run.
+//!
+//! An executor is a thread with a priority that runs its agents one after another: they do not interrupt each other, and each may have to wait for
+//! the step of another that has just begun. Whoever is of a higher executor that may run on one of the same processors goes before. An agent
+//! runs by the clock, by what comes from outside, or because another one has sent it something: then it inherits the other's period, and is as
+//! late as that one's step may end. What makes it run is its *streams*, and each is a task of its own to the tests.
+//!
+//! The bounds are those of holistic analysis (Tindell and Clark 1994): responses and the lateness that they cause are reckoned in turns until
+//! nothing changes. They hold for executors that may run on several processors, too: as long as one waits, one of its processors is at work for
+//! those who go before it, as on a single one.
+
+use num_traits::Zero;
+
+use crate::Exact;
+use crate::exact::common_denominator;
+use crate::processors::Mask;
+use crate::task::Row;
+
+/// A thread that runs agents. Those without priority run on what is left, and nothing is promised to them.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Executor {
+    /// The greater goes before; nothing for an ordinary thread.
+    pub priority: Option<u8>,
+    /// Where it may run.
+    pub may: Mask,
+}
+
+/// What makes an agent run.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Source {
+    /// The clock. A release that was passed over is not made up for.
+    Clock {
+        /// The time between two.
+        period: Exact,
+    },
+    /// What another agent sends in its steps.
+    After {
+        /// Its place among the agents.
+        agent: usize,
+        /// One of so many of its messages; 1 for each.
+        every: u32,
+        /// The least time between two of them, where it does not send in each step; zero where it does.
+        least: Exact,
+        /// How many of them wait at most.
+        depth: u32,
+    },
+}
+
+/// An agent as the analysis sees it. Times in nanoseconds.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Agent {
+    /// Processor time of a step at worst, with what the runtime does around it.
+    pub cost: Exact,
+    /// How soon after it was made to run a step must be done.
+    pub deadline: Exact,
+    /// Its executor.
+    pub executor: usize,
+    /// What makes it run.
+    pub sources: Vec<Source>,
+    /// The least time between two steps that others make it run; zero for none.
+    pub least_gap: Exact,
+}
+
+/// Agents and the threads that run them.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct System {
+    /// The threads.
+    pub executors: Vec<Executor>,
+    /// The agents.
+    pub agents: Vec<Agent>,
+}
+
+/// What is found of an agent. Times in nanoseconds.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Found {
+    /// What makes it run.
+    pub streams: Vec<Stream>,
+    /// From what made it run to the end of its step at worst; nothing where that is not bounded, or nothing is promised.
+    pub response: Option<Exact>,
+    /// Whether that is within its deadline.
+    pub meets: bool,
+}
+
+/// What makes an agent run, as the tests count it: no more than ⌈(w + jitter) / period⌉ in a time of w.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Stream {
+    /// The time between two on the long run, at least.
+    pub period: Exact,
+    /// How late one may be.
+    pub jitter: Exact,
+    /// Whose message it is; nothing for the clock.
+    pub after: Option<usize>,
+}
+
+/// Why a system cannot be analysed.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+pub enum Unsound {
+    /// Agents that make each other run for ever: each the next one, and the last the first.
+    #[error("agents make each other run in a circle")]
+    Circle(Vec<usize>),
+    /// The times have too great a common denominator.
+    #[error("the times cannot be reckoned exactly: take fewer digits")]
+    TooFine,
+}
+
+/// More rounds than sets that fit have needed.
+const ROUNDS: usize = 10_000;
+/// A response of so many times the longest period is as good as none.
+const LONG: i128 = 64;
+
+impl System {
+    /// What is found of each agent.
+    ///
+    /// # Errors
+    /// Agents that make each other run in a circle, and times that are too fine.
+    pub fn analyse(&self) -> Result<Vec<Found>, Unsound> {
+        let order = self.order()?;
+        let ticks = self.ticks().ok_or(Unsound::TooFine)?;
+        let whole = Whole {
+            system: self,
+            ticks,
+            agents: self.agents.iter().map(|agent| Numbers::of(agent, ticks)).collect(),
+        };
+        // Lateness makes responses longer, and they make others late: from below, until nothing changes.
+        let mut responses = vec![Some(0); self.agents.len()];
+        let mut streams = whole.streams(&order, &responses);
+        for _ in 0..ROUNDS {
+            let next: Vec<Option<i128>> =
+                (0..self.agents.len()).map(|at| whole.response(&streams, at)).collect();
+            if next == responses {
+                return Ok(whole.told(&streams, &responses));
+            }
+            responses = next;
+            streams = whole.streams(&order, &responses);
+        }
+        Ok(whole.told(&streams, &vec![None; self.agents.len()]))
+    }
+
+    /// Whether all that run in real time meet their deadlines.
+    ///
+    /// # Errors
+    /// As [`System::analyse`].
+    pub fn is_feasible(&self) -> Result<bool, Unsound> {
+        let found = self.analyse()?;
+        Ok(found.iter().enumerate().all(|(at, found)| found.meets || !self.is_in_real_time(at)))
+    }
+
+    /// Whether anything is promised to an agent.
+    pub fn is_in_real_time(&self, agent: usize) -> bool {
+        self.executors[self.agents[agent].executor].priority.is_some()
+    }
+
+    /// How long after what happened at its beginning a chain of agents has answered at worst, in nanoseconds, each of whom reads what the one
+    /// before has sent: it runs for it, or finds it at its next release. What the first one waits for is not in it: that is its
+    /// own source's. Nothing where an agent has no bound, or does not hear of the one before and has no clock.
+    pub fn latency(&self, found: &[Found], chain: &[usize]) -> Option<Exact> {
+        let mut sum = Exact::zero();
+        for (place, at) in chain.iter().enumerate() {
+            let runs_for_it = place == 0 || {
+                let before = chain[place - 1];
+                self.agents[*at]
+                    .sources
+                    .iter()
+                    .any(|source| matches!(source, Source::After { agent, .. } if *agent == before))
+            };
+            if !runs_for_it {
+                let clocks = found[*at].streams.iter().filter(|stream| stream.after.is_none());
+                // It has just been released when the message comes.
+                sum += clocks.map(|stream| stream.period).min()?;
+            }
+            sum += found[*at].response?;
+        }
+        Some(sum)
+    }
+
+    /// Those that make others run before these.
+    fn order(&self) -> Result<Vec<usize>, Unsound> {
+        const OPEN: u8 = 1;
+        const DONE: u8 = 2;
+        let mut order = Vec::new();
+        let mut state = vec![0u8; self.agents.len()];
+        for first in 0..self.agents.len() {
+            // Agents, and which of their sources is to be looked at next.
+            let mut path = if state[first] == DONE { Vec::new() } else { vec![(first, 0)] };
+            while let Some((at, next)) = path.last_mut() {
+                let (at, place) = (*at, *next);
+                *next += 1;
+                state[at] = OPEN;
+                match self.agents[at].sources.get(place) {
+                    Some(Source::After { agent, .. }) if state[*agent] == OPEN => {
+                        let from = path.iter().position(|(on, _)| on == agent).unwrap_or(0);
+                        return Err(Unsound::Circle(path[from..].iter().rev().map(|(at, _)| *at).collect()));
+                    }
+                    Some(Source::After { agent, .. }) if state[*agent] != DONE => path.push((*agent, 0)),
+                    Some(_) => {}
+                    None => {
+                        state[at] = DONE;
+                        order.push(at);
+                        path.pop();
+                    }
+                }
+            }
+        }
+        Ok(order)
+    }
+
+    fn ticks(&self) -> Option<i128> {
+        let times = self.agents.iter().flat_map(|agent| {
+            let sources = agent.sources.iter().map(|source| match source {
+                Source::Clock { period } => *period,
+                Source::After { least, .. } => *least,
+            });
+            [agent.cost, agent.deadline, agent.least_gap].into_iter().chain(sources)
+        });
+        common_denominator(times)
+    }
+}
+
+/// The numbers of an agent in whole ticks.
+struct Numbers {
+    cost: i128,
+    deadline: i128,
+    least_gap: i128,
+    sources: Vec<i128>,
+}
+
+impl Numbers {
+    fn of(agent: &Agent, ticks: i128) -> Numbers {
+        let whole = |time: Exact| (time * Exact::from_integer(ticks)).to_integer();
+        let source = |source: &Source| match source {
+            Source::Clock { period } => whole(*period).max(1),
+            Source::After { least, .. } => whole(*least),
+        };
+        Numbers {
+            cost: whole(agent.cost),
+            deadline: whole(agent.deadline),
+            least_gap: whole(agent.least_gap),
+            sources: agent.sources.iter().map(source).collect(),
+        }
+    }
+}
+
+/// A stream in whole ticks: a row, and whose message it is.
+#[derive(Clone, Copy, PartialEq, Eq)]
+struct Flow {
+    row: Row,
+    after: Option<usize>,
+    /// How many messages of it may wait.
+    depth: u32,
+}
+
+struct Whole<'a> {
+    system: &'a System,
+    ticks: i128,
+    agents: Vec<Numbers>,
+}
+
+impl Whole<'_> {
+    /// What makes each agent run when the others take so long.
+    fn streams(&self, order: &[usize], responses: &[Option<i128>]) -> Vec<Vec<Flow>> {
+        let mut streams: Vec<Vec<Flow>> = vec![Vec::new(); self.agents.len()];
+        for at in order {
+            let (agent, numbers) = (&self.system.agents[*at], &self.agents[*at]);
+            let flow = |period: i128, jitter, after, depth| Flow {
+                row: Row { cost: numbers.cost, period, deadline: numbers.deadline, jitter, blocking: 0 },
+                after,
+                depth,
+            };
+            let (mut by_clock, mut by_others) = (Vec::new(), Vec::new());
+            for (source, number) in agent.sources.iter().zip(&numbers.sources) {
+                match source {
+                    Source::Clock { .. } => by_clock.push(flow(*number, 0, None, 0)),
+                    Source::After { agent, every, depth, .. } => {
+                        for stream in &streams[*agent] {
+                            let period = (stream.row.period * i128::from((*every).max(1))).max(*number);
+                            let late = lateness(stream, responses[*agent]);
+                            by_others.push(flow(period, late, Some(*agent), *depth));
+                        }
+                    }
+                }
+            }
+            let gap = numbers.least_gap;
+            let rate: f64 = by_others.iter().map(|flow| gap as f64 / flow.row.period as f64).sum();
+            let burst = by_others.iter().any(|flow| flow.row.jitter > gap);
+            if gap > 0 && (rate > 1.0 || burst) {
+                // Steps begin so far apart, whatever comes.
+                let after = by_others.first().and_then(|flow| flow.after);
+                by_others = vec![flow(gap, 0, after, 0)];
+            }
+            by_clock.extend(by_others);
+            streams[*at] = by_clock;
+        }
+        streams
+    }
+
+    /// From what made an agent run to the end of its step at worst.
+    fn response(&self, streams: &[Vec<Flow>], at: usize) -> Option<i128> {
+        if !self.system.is_in_real_time(at) {
+            return None;
+        }
+        let longest = streams.iter().flatten().map(|flow| flow.row.period).max().unwrap_or(1);
+        let limit = longest.max(self.agents[at].deadline).saturating_mul(LONG);
+        let own = self.system.agents[at].executor;
+        let mut before: Vec<Row> = Vec::new();
+        let mut longest_other = 0;
+        for (other, agent) in self.system.agents.iter().enumerate() {
+            if other == at || !self.goes_before(agent.executor, own) {
+                continue;
+            }
+            before.extend(streams[other].iter().map(|flow| flow.row));
+            if agent.executor == own {
+                longest_other = longest_other.max(self.agents[other].cost);
+            }
+        }
+        let mut worst = Some(0);
+        for (place, flow) in streams[at].iter().enumerate() {
+            let mut before = before.clone();
+            before.extend(
+                streams[at].iter().enumerate().filter(|(other, _)| *other != place).map(|(_, flow)| flow.row),
+            );
+            let own = Row { blocking: longest_other, ..flow.row };
+            worst = worst.zip(longest_wait(&own, &before, limit)).map(|(a, b)| a.max(b));
+        }
+        worst
+    }
+
+    /// Whether what one executor does keeps another one waiting.
+    fn goes_before(&self, one: usize, other: usize) -> bool {
+        let (a, b) = (&self.system.executors[one], &self.system.executors[other]);
+        one == other
+            || (a.priority > b.priority && a.may & b.may != 0)
+            || (a.priority == b.priority && a.may & b.may != 0)
+    }
+
+    fn told(&self, streams: &[Vec<Flow>], responses: &[Option<i128>]) -> Vec<Found> {
+        let time = |ticks: i128| Exact::new(ticks, self.ticks);
+        let stream = |flow: &Flow| Stream {
+            period: time(flow.row.period),
+            jitter: time(flow.row.jitter),
+            after: flow.after,
+        };
+        let found = streams.iter().zip(responses).zip(&self.agents);
+        found
+            .map(|((streams, response), numbers)| Found {
+                streams: streams.iter().map(stream).collect(),
+                response: response.map(time),
+                meets: response.is_some_and(|response| response <= numbers.deadline),
+            })
+            .collect()
+    }
+}
+
+/// How late what an agent sends may be that runs for such a stream and takes so long.
+///
+/// Where its response has no bound, or a longer one: releases by the clock that are passed over are not made up for, so its steps begin less than
+/// a period late, and end one after another. Of messages no more than the mailbox holds are waiting for it.
+fn lateness(stream: &Flow, response: Option<i128>) -> i128 {
+    let Row { period, jitter, .. } = stream.row;
+    let bound = match stream.after {
+        None => 2 * period,
+        Some(_) => jitter.saturating_add(period.saturating_mul(i128::from(stream.depth) + 2)),
+    };
+    response.map_or(bound, |response| jitter.saturating_add(response).min(bound))
+}
+
+/// From the moment when a job becomes ready to its end at worst, also where the one before is not done yet; nothing beyond the limit.
+fn longest_wait(own: &Row, before: &[Row], limit: i128) -> Option<i128> {
+    let mut worst = 0;
+    let mut jobs = 1;
+    let mut ready = own.cost + own.blocking;
+    loop {
+        let work = own.cost.saturating_mul(jobs).saturating_add(own.blocking);
+        ready = ready.max(work);
+        loop {
+            let all = before.iter().fold(work, |sum, row| sum.saturating_add(row.work_within(ready.max(1))));
+            if all == ready {
+                break;
+            }
+            if all > limit {
+                return None;
+            }
+            ready = all;
+        }
+        // The last of them became ready no earlier than this after the first.
+        let came = ((jobs - 1) * own.period - own.jitter).max(0);
+        worst = worst.max(ready - came);
+        if ready <= jobs * own.period - own.jitter {
+            return Some(worst);
+        }
+        jobs += 1;
+    }
+}
