@@ -10,7 +10,7 @@ use runtime::Registry;
 use types::Duration;
 
 use crate::error::Failure;
-use crate::{bench, live, log, run, terminal, tools};
+use crate::{analyze, bench, live, log, run, terminal, tools};
 
 /// Many agents, one robot, in time: runs systems of agents on robots, in simulation and on recorded data.
 ///
@@ -33,6 +33,8 @@ enum Command {
     Live(live::LiveCommand),
     /// Finds all mistakes of a system file without running it.
     Check(tools::CheckArgs),
+    /// Says whether all deadlines are met, and with how much room: exact tests, a schedule as a picture.
+    Analyze(analyze::AnalyzeArgs),
     /// Prints the JSON schema of system files, for editors.
     Schema,
     /// Looks into logs, draws them, plays them, mends them.
@@ -209,6 +211,7 @@ fn done(command: Command, registry: Registry, json: bool) -> Result<ExitCode, Fa
         Command::Run(args) => run::run(&args, registry, json),
         Command::Live(command) => live::live(command, json),
         Command::Check(args) => tools::check(&args, &registry, json),
+        Command::Analyze(args) => analyze::analyze(&args, &registry, json),
         Command::Schema => Ok(tools::print_schema(&registry)),
         Command::Log(command) => log::log(command, json),
         Command::New(command) => tools::make(&command, json),

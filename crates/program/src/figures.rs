@@ -58,6 +58,15 @@ pub(crate) fn robots(notes: &Notes) -> Vec<String> {
     scenery::robots(notes).into_iter().map(|robot| robot.name).collect()
 }
 
+/// Writes one picture in both forms into a folder, which is made; gives the files.
+pub(crate) fn write(picture: &Picture, folder: &Path, name: &str) -> Result<Vec<String>, String> {
+    std::fs::create_dir_all(folder)
+        .map_err(|error| format!("{} cannot be made: {error}", folder.display()))?;
+    let mut files = Files { folder, made: Vec::new() };
+    files.write(name, picture)?;
+    Ok(files.made.iter().map(|file| file.display().to_string()).collect())
+}
+
 struct Files<'a> {
     folder: &'a Path,
     made: Vec<PathBuf>,

@@ -13,6 +13,7 @@
 //! | what is done with logs | `log` |
 //! | measurements | `bench` |
 
+mod analyze;
 mod bench;
 mod cli;
 pub mod doctor;

@@ -117,6 +117,7 @@ fn agent(kind: &AgentType) -> Json {
         ("period", time("Time between two steps.")),
         ("period_min", time("The shortest period that its designer allows.")),
         ("period_max", time("The longest period that its designer allows.")),
+        ("cost", time("Processor time of a step at worst, where it is known.")),
         (
             "deadline",
             time("How soon after its release a step must be done; the period when nothing is said."),

@@ -66,6 +66,9 @@ pub struct AgentPlan {
     pub period: Option<Duration>,
     /// The shortest and the longest period that its designer allows.
     pub period_range: Option<(Duration, Duration)>,
+    /// Processor time of a step at worst, where its designer knows it: what analysis and admission count before steps were measured, and what a
+    /// step takes on virtual processors.
+    pub cost: Option<Duration>,
     /// How soon after its release a step must be done; the period when nothing is said.
     pub deadline: Option<Duration>,
     /// The inputs whose messages make it run.

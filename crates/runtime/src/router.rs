@@ -362,13 +362,7 @@ impl Router {
     }
 
     fn executor_for(&self, plan: &AgentPlan, timing: Timing) -> Reply<usize> {
-        let name = match &plan.executor {
-            Some(name) => name.as_str(),
-            None if timing.deadline <= Duration::ZERO => "ordinary",
-            None if timing.deadline <= Duration::millis(10) => "reflex",
-            None if timing.deadline <= Duration::millis(100) => "control",
-            None => "ordinary",
-        };
+        let name = plan.executor.as_deref().unwrap_or(usual_executor(timing.deadline));
         self.executors.iter().position(|executor| executor.plan.name == name).ok_or_else(|| {
             Refusal::unknown("executor", name, self.executors.iter().map(|e| e.plan.name.as_str()))
         })
@@ -442,6 +436,16 @@ fn first(mistakes: Vec<types::value::Mistake>) -> Refusal {
         refusal.what = format!("{}; {more}", refusal.what);
     }
     refusal
+}
+
+/// The executor of an agent that names none.
+pub(crate) fn usual_executor(deadline: Duration) -> &'static str {
+    match deadline {
+        deadline if deadline <= Duration::ZERO => "ordinary",
+        deadline if deadline <= Duration::millis(10) => "reflex",
+        deadline if deadline <= Duration::millis(100) => "control",
+        _ => "ordinary",
+    }
 }
 
 /// The usual deadline of an agent that only messages make run.

@@ -44,6 +44,23 @@ pub enum Source {
         /// How many of them wait at most.
         depth: u32,
     },
+    /// What another agent sends by a clock of its own, whatever makes it run: a robot its readings.
+    Paced {
+        /// Its place among the agents.
+        agent: usize,
+        /// The time between two of them.
+        period: Exact,
+    },
+}
+
+impl Source {
+    /// Whose messages they are; nothing for the clock.
+    pub fn agent(&self) -> Option<usize> {
+        match self {
+            Source::Clock { .. } => None,
+            Source::After { agent, .. } | Source::Paced { agent, .. } => Some(*agent),
+        }
+    }
 }
 
 /// An agent as the analysis sees it. Times in nanoseconds.
@@ -103,8 +120,8 @@ pub enum Unsound {
     TooFine,
 }
 
-/// More rounds than sets that fit have needed.
-const ROUNDS: usize = 10_000;
+/// More rounds than most sets need.
+const ROUNDS: usize = 100;
 /// A response of so many times the longest period is as good as none.
 const LONG: i128 = 64;
 
@@ -114,26 +131,9 @@ impl System {
     /// # Errors
     /// Agents that make each other run in a circle, and times that are too fine.
     pub fn analyse(&self) -> Result<Vec<Found>, Unsound> {
-        let order = self.order()?;
-        let ticks = self.ticks().ok_or(Unsound::TooFine)?;
-        let whole = Whole {
-            system: self,
-            ticks,
-            agents: self.agents.iter().map(|agent| Numbers::of(agent, ticks)).collect(),
-        };
-        // Lateness makes responses longer, and they make others late: from below, until nothing changes.
-        let mut responses = vec![Some(0); self.agents.len()];
-        let mut streams = whole.streams(&order, &responses);
-        for _ in 0..ROUNDS {
-            let next: Vec<Option<i128>> =
-                (0..self.agents.len()).map(|at| whole.response(&streams, at)).collect();
-            if next == responses {
-                return Ok(whole.told(&streams, &responses));
-            }
-            responses = next;
-            streams = whole.streams(&order, &responses);
-        }
-        Ok(whole.told(&streams, &vec![None; self.agents.len()]))
+        let whole = Whole::of(self)?;
+        let (streams, responses) = whole.settle(|_| false);
+        Ok(whole.told(&streams, &responses))
     }
 
     /// Whether all that run in real time meet their deadlines.
@@ -141,8 +141,16 @@ impl System {
     /// # Errors
     /// As [`System::analyse`].
     pub fn is_feasible(&self) -> Result<bool, Unsound> {
-        let found = self.analyse()?;
-        Ok(found.iter().enumerate().all(|(at, found)| found.meets || !self.is_in_real_time(at)))
+        let whole = Whole::of(self)?;
+        let misses = |responses: &[Option<i128>]| {
+            let mut all = responses.iter().zip(&whole.agents).enumerate();
+            all.any(|(at, (response, agent))| {
+                self.is_in_real_time(at) && response.is_none_or(|response| response > agent.deadline)
+            })
+        };
+        // Responses only grow from round to round: who misses once misses.
+        let (_, responses) = whole.settle(misses);
+        Ok(!misses(&responses))
     }
 
     /// Whether anything is promised to an agent.
@@ -158,10 +166,7 @@ impl System {
         for (place, at) in chain.iter().enumerate() {
             let runs_for_it = place == 0 || {
                 let before = chain[place - 1];
-                self.agents[*at]
-                    .sources
-                    .iter()
-                    .any(|source| matches!(source, Source::After { agent, .. } if *agent == before))
+                self.agents[*at].sources.iter().any(|source| source.agent() == Some(before))
             };
             if !runs_for_it {
                 let clocks = found[*at].streams.iter().filter(|stream| stream.after.is_none());
@@ -207,7 +212,7 @@ impl System {
     fn ticks(&self) -> Option<i128> {
         let times = self.agents.iter().flat_map(|agent| {
             let sources = agent.sources.iter().map(|source| match source {
-                Source::Clock { period } => *period,
+                Source::Clock { period } | Source::Paced { period, .. } => *period,
                 Source::After { least, .. } => *least,
             });
             [agent.cost, agent.deadline, agent.least_gap].into_iter().chain(sources)
@@ -228,7 +233,7 @@ impl Numbers {
     fn of(agent: &Agent, ticks: i128) -> Numbers {
         let whole = |time: Exact| (time * Exact::from_integer(ticks)).to_integer();
         let source = |source: &Source| match source {
-            Source::Clock { period } => whole(*period).max(1),
+            Source::Clock { period } | Source::Paced { period, .. } => whole(*period).max(1),
             Source::After { least, .. } => whole(*least),
         };
         Numbers {
@@ -253,13 +258,44 @@ struct Whole<'a> {
     system: &'a System,
     ticks: i128,
     agents: Vec<Numbers>,
+    /// Those that make others run before these.
+    order: Vec<usize>,
 }
 
+/// Of each agent what makes it run.
+type Streams = Vec<Vec<Flow>>;
+/// Of each agent how long it takes at worst; nothing where that is not bounded.
+type Responses = Vec<Option<i128>>;
+
 impl Whole<'_> {
+    fn of(system: &System) -> Result<Whole<'_>, Unsound> {
+        let order = system.order()?;
+        let ticks = system.ticks().ok_or(Unsound::TooFine)?;
+        let agents = system.agents.iter().map(|agent| Numbers::of(agent, ticks)).collect();
+        Ok(Whole { system, ticks, agents, order })
+    }
+
+    /// Lateness makes responses longer, and they make others late: from below, until nothing changes, or it is enough. Where that takes too
+    /// many rounds everybody is as late as can be.
+    fn settle(&self, is_enough: impl Fn(&[Option<i128>]) -> bool) -> (Streams, Responses) {
+        let mut responses: Responses = vec![Some(0); self.agents.len()];
+        for _ in 0..ROUNDS {
+            let streams = self.streams(&responses);
+            let next: Responses = (0..self.agents.len()).map(|at| self.response(&streams, at)).collect();
+            if next == responses || is_enough(&next) {
+                return (streams, next);
+            }
+            responses = next;
+        }
+        let streams = self.streams(&vec![None; self.agents.len()]);
+        let responses = (0..self.agents.len()).map(|at| self.response(&streams, at)).collect();
+        (streams, responses)
+    }
+
     /// What makes each agent run when the others take so long.
-    fn streams(&self, order: &[usize], responses: &[Option<i128>]) -> Vec<Vec<Flow>> {
-        let mut streams: Vec<Vec<Flow>> = vec![Vec::new(); self.agents.len()];
-        for at in order {
+    fn streams(&self, responses: &[Option<i128>]) -> Streams {
+        let mut streams: Streams = vec![Vec::new(); self.agents.len()];
+        for at in &self.order {
             let (agent, numbers) = (&self.system.agents[*at], &self.agents[*at]);
             let flow = |period: i128, jitter, after, depth| Flow {
                 row: Row { cost: numbers.cost, period, deadline: numbers.deadline, jitter, blocking: 0 },
@@ -270,6 +306,10 @@ impl Whole<'_> {
             for (source, number) in agent.sources.iter().zip(&numbers.sources) {
                 match source {
                     Source::Clock { .. } => by_clock.push(flow(*number, 0, None, 0)),
+                    Source::Paced { agent, .. } => {
+                        let late = responses[*agent].unwrap_or(2 * number).min(2 * number);
+                        by_others.push(flow(*number, late, Some(*agent), 1));
+                    }
                     Source::After { agent, every, depth, .. } => {
                         for stream in &streams[*agent] {
                             let period = (stream.row.period * i128::from((*every).max(1))).max(*number);
@@ -365,12 +405,22 @@ fn lateness(stream: &Flow, response: Option<i128>) -> i128 {
 
 /// From the moment when a job becomes ready to its end at worst, also where the one before is not done yet; nothing beyond the limit.
 fn longest_wait(own: &Row, before: &[Row], limit: i128) -> Option<i128> {
+    let share: f64 = before.iter().map(Row::share).sum();
+    if share + own.share() > 1.0 + 1e-12 {
+        return None;
+    }
+    let late: f64 = before.iter().map(|row| row.share() * row.jitter as f64).sum();
     let mut worst = 0;
     let mut jobs = 1;
     let mut ready = own.cost + own.blocking;
     loop {
         let work = own.cost.saturating_mul(jobs).saturating_add(own.blocking);
-        ready = ready.max(work);
+        // It cannot be less: w ≥ work + Σ U (w + J). Rounded down, as far as numbers go.
+        let least = (work as f64 + late) / (1.0 - share).max(1e-12) * (1.0 - 1e-9) - 1.0;
+        if least > limit as f64 {
+            return None;
+        }
+        ready = ready.max(work).max(least as i128);
         loop {
             let all = before.iter().fold(work, |sum, row| sum.saturating_add(row.work_within(ready.max(1))));
             if all == ready {

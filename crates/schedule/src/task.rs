@@ -52,7 +52,7 @@ impl Task {
         [
             (self.period <= none, What::Period),
             (self.cost < none, What::Cost),
-            (self.due() <= none, What::Deadline),
+            (self.deadline.is_some_and(|deadline| deadline <= none), What::Deadline),
             (self.due() > self.period && self.period > none, What::LateDeadline),
             (self.jitter < none, What::Jitter),
             (self.blocking < none, What::Blocking),

@@ -113,6 +113,7 @@ fn read_add(words: &[String]) -> Read<AgentPlan> {
     plan.executor = pairs.take("executor").map(str::to_owned);
     plan.period = pairs.span("period")?;
     plan.period_range = pairs.take("period_range").map(read_range).transpose()?;
+    plan.cost = pairs.span("cost")?;
     plan.deadline = pairs.span("deadline")?;
     plan.hang_after = pairs.span("hang_after")?;
     plan.min_gap = pairs.span("min_gap")?.unwrap_or_default();

@@ -11,8 +11,18 @@ use types::{Category, Duration, Priority};
 use super::*;
 
 /// The keys of `add` that are no parameters of the agent.
-const AGENT_KEYS: [&str; 9] =
-    ["robot", "period", "period_range", "deadline", "on", "min_gap", "executor", "on_death", "hang_after"];
+const AGENT_KEYS: [&str; 10] = [
+    "robot",
+    "period",
+    "period_range",
+    "cost",
+    "deadline",
+    "on",
+    "min_gap",
+    "executor",
+    "on_death",
+    "hang_after",
+];
 
 fn read(line: &str) -> Result<Request, runtime::Refusal> {
     parse(&split(line).unwrap())
@@ -170,11 +180,11 @@ prop_compose! {
     fn agent()(
         (name, kind, robot, executor) in (name(), name(), option::of(name()), option::of(name())),
         (period, period_range) in (option::of(span()), option::of((span(), span()))),
-        (deadline, hang_after, min_gap) in (option::of(span()), option::of(span()), span()),
+        (cost, deadline, hang_after, min_gap) in (option::of(span()), option::of(span()), option::of(span()), span()),
         (on, leaves, params) in (vec(name(), 0..3), any::<bool>(), params()),
     ) -> AgentPlan {
         let on_death = if leaves { OnDeath::Leave } else { OnDeath::Restart };
-        AgentPlan { name, kind, robot, executor, period, period_range, deadline, hang_after, min_gap, on, on_death, params, ..AgentPlan::default() }
+        AgentPlan { name, kind, robot, executor, period, period_range, cost, deadline, hang_after, min_gap, on, on_death, params, ..AgentPlan::default() }
     }
 }
 

@@ -62,6 +62,7 @@ fn add(plan: &AgentPlan) -> Vec<String> {
     push(&mut out, "executor", plan.executor.as_ref());
     push(&mut out, "period", plan.period);
     push(&mut out, "period_range", plan.period_range.map(|(least, most)| format!("{least}..{most}")));
+    push(&mut out, "cost", plan.cost);
     push(&mut out, "deadline", plan.deadline);
     push(&mut out, "hang_after", plan.hang_after);
     push(&mut out, "min_gap", (plan.min_gap != Duration::ZERO).then_some(plan.min_gap));

@@ -9,12 +9,13 @@ use types::value::{Mistake, Span, Table, TableReader};
 use super::read::{ROBOT, Reader, span_of_time, unknown};
 
 /// The entries that every agent can have; all others are its parameters.
-const ENTRIES: [&str; 12] = [
+const ENTRIES: [&str; 13] = [
     "is",
     "robot",
     "period",
     "period_min",
     "period_max",
+    "cost",
     "deadline",
     "on",
     "min_gap",
@@ -123,6 +124,7 @@ fn robot_of(r: &mut TableReader<'_>, robots: &Table, group_robot: Option<&str>) 
 
 fn timing(r: &mut TableReader<'_>, agent: &mut AgentPlan) {
     agent.period = span_of_time(r, "period");
+    agent.cost = span_of_time(r, "cost");
     agent.deadline = span_of_time(r, "deadline");
     agent.min_gap = span_of_time(r, "min_gap").unwrap_or(Duration::ZERO);
     agent.hang_after = span_of_time(r, "hang_after");

@@ -24,7 +24,7 @@ mod requests;
 mod set;
 mod sources;
 mod syntax;
-mod tree;
+pub(crate) mod tree;
 mod wires;
 mod write;
 

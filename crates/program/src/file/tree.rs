@@ -9,7 +9,7 @@ use types::value::{Entry, Mistake, Row, Span, Table, Value};
 use super::{Sources, syntax};
 
 /// Reads the text that begins at `base`. Gives nothing when it is no TOML, and all mistakes.
-pub(super) fn read(sources: &Sources, base: u32, mistakes: &mut Vec<Mistake>) -> Option<Table> {
+pub(crate) fn read(sources: &Sources, base: u32, mistakes: &mut Vec<Mistake>) -> Option<Table> {
     let before = mistakes.len();
     let text = sources.text(base);
     let mut reader = Reader { base, mistakes };

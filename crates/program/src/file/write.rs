@@ -125,6 +125,7 @@ fn agent(agent: &AgentPlan, decides: bool, out: &mut String) -> fmt::Result {
         span("period_min", Some(least), out)?;
         span("period_max", Some(most), out)?;
     }
+    span("cost", agent.cost, out)?;
     span("deadline", agent.deadline, out)?;
     match agent.on.as_slice() {
         [] => {}

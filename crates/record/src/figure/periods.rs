@@ -30,6 +30,7 @@ pub struct Periods {
 const WIDTH: f64 = 460.0;
 const RIGHT: f64 = 12.0;
 const ROW: f64 = 24.0;
+const UNITS: [(f64, &str); 3] = [(1.0, "s"), (1e-3, "ms"), (1e-6, "µs")];
 
 impl Periods {
     /// Draws it.
@@ -54,7 +55,17 @@ impl Periods {
             picture.clip(None);
         }
         frame.border(&mut picture);
-        frame.x_axis(&mut picture, &labelled(&ticks), "time (s)");
+        // In the unit in which the ticks are numbers that people read.
+        let length = frame.x.max - frame.x.min;
+        let (scale, unit) =
+            UNITS.into_iter().find(|(scale, _)| length >= 2.0 * scale).unwrap_or((1e-9, "ns"));
+        let scaled: Vec<f64> = ticks.iter().map(|tick| tick / scale).collect();
+        let texts = labelled(&scaled)
+            .into_iter()
+            .zip(&ticks)
+            .map(|((_, text), tick)| (*tick, text))
+            .collect::<Vec<_>>();
+        frame.x_axis(&mut picture, &texts, &format!("time ({unit})"));
         picture
     }
 

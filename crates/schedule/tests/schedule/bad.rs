@@ -17,7 +17,6 @@ fn all_that_is_wrong_is_told_at_once() {
     ];
     let what = [
         (1, What::Period),
-        (1, What::Deadline),
         (2, What::Cost),
         (3, What::LateDeadline),
         (4, What::Deadline),

@@ -178,7 +178,7 @@ fn longest(drawn: &Drawn) -> Vec<i128> {
     }
     let period = |at: usize| match agents[at].sources[0] {
         Source::Clock { period } => Some(period.to_integer()),
-        Source::After { .. } => None,
+        _ => None,
     };
     let together = draw(2) == 0;
     let mut next: Vec<Option<i128>> = (0..agents.len())
