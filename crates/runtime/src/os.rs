@@ -62,8 +62,12 @@ fn checked(result: libc::c_int) -> io::Result<()> {
     if result == 0 { Ok(()) } else { Err(io::Error::last_os_error()) }
 }
 
-/// Gives the calling thread a real-time priority (1 to 99), first in first out.
+/// Gives the calling thread a real-time priority (1 to 99), first in first out. Under ThreadSanitizer it keeps the one it has: who waits for a
+/// lock of the sanitizer spins, and from above would never let a thread go on that has it.
 pub(crate) fn set_fifo(priority: u8) -> io::Result<()> {
+    if cfg!(tsan) {
+        return Ok(());
+    }
     let param = libc::sched_param { sched_priority: priority.into() };
     // SAFETY: zero is the calling thread; `param` is valid.
     checked(unsafe { libc::sched_setscheduler(0, libc::SCHED_FIFO, &param) })
