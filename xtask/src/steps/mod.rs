@@ -145,7 +145,7 @@ pub(crate) const ALL: [Step; 16] = [
 /// What takes long, or a compiler that not everybody has: only where it is named.
 pub(crate) const MORE: [Step; 1] = [Step {
     name: "sanitize",
-    shows: "no race between the threads of the runtime, and nothing that blocks on those in real time (by name only; needs a nightly compiler)",
+    shows: "no race between the threads of the runtime, and nothing that blocks on those in real time (by name only; needs a nightly compiler with rust-src)",
     needs: &[Need::Compiler],
     run: sanitize::run,
 }];
