@@ -22,30 +22,98 @@ const SEQUENCE_SHIFT: u32 = 16;
 /// The state of a slot that no reader may pin.
 const UNREADABLE: u64 = u64::MAX;
 
+/// What a reader looks at stands first: with the state it lies in one line of memory where the head is small.
+#[repr(C)]
 struct Content<T: Message> {
-    header: Header,
-    head: T,
-    row: Box<[T::Element]>,
     len: usize,
+    row: Box<[T::Element]>,
+    head: T,
+    header: Header,
 }
 
+#[repr(C, align(64))]
 struct Slot<T: Message> {
     state: AtomicU64,
     content: UnsafeCell<Content<T>>,
 }
 
-pub(crate) struct Shared<T: Message> {
-    slots: Box<[Slot<T>]>,
-    /// The last published, as sequence and slot, at place `sequence % (history + 1)`.
-    recent: Box<[AtomicU64]>,
-    /// How many were published.
-    published: AtomicU64,
+// SAFETY: the content of a slot is written only by the one writer while its state is unreadable, and read only under a pin.
+unsafe impl<T: Message> Sync for Slot<T> {}
+// SAFETY: messages are plain data.
+unsafe impl<T: Message> Send for Slot<T> {}
+
+impl<T: Message> Slot<T> {
+    /// Takes it back from its readers, where none has pinned it.
+    #[inline]
+    fn take_back(&self) -> bool {
+        let seen = self.state.load(Ordering::Relaxed);
+        // Acquire pairs with the release in `Pin::drop`: the last reader has done reading.
+        let ordering = named("memory: take back", Ordering::Acquire);
+        seen == UNREADABLE
+            || seen & PINS == 0
+                && self.state.compare_exchange(seen, UNREADABLE, ordering, Ordering::Relaxed).is_ok()
+    }
+
+    /// Pins it if it still holds the message with that sequence.
+    #[inline]
+    fn pin(&self, sequence: u64) -> bool {
+        let mut seen = self.state.load(Ordering::Relaxed);
+        loop {
+            if seen == UNREADABLE || seen >> SEQUENCE_SHIFT != sequence || seen & PINS == PINS - 1 {
+                return false;
+            }
+            // Acquire pairs with the release in `Loan::publish`; a writer that takes the slot makes the exchange fail.
+            let ordering = named("memory: pin", Ordering::Acquire);
+            match self.state.compare_exchange(seen, seen + 1, ordering, Ordering::Relaxed) {
+                Ok(_) => return true,
+                Err(now) => seen = now,
+            }
+        }
+    }
+
+    #[inline]
+    fn unpin(&self) {
+        // Pairs with the acquire in `Slot::take_back`.
+        self.state.fetch_sub(1, named("memory: unpin", Ordering::Release));
+    }
 }
 
-// SAFETY: the content of a slot is written only by the one writer while its state is unreadable, and read only under a pin.
-unsafe impl<T: Message> Sync for Shared<T> {}
-// SAFETY: messages are plain data.
-unsafe impl<T: Message> Send for Shared<T> {}
+/// What the writer and its readers have in common.
+pub(crate) struct Shared<T: Message> {
+    slots: Arc<[Slot<T>]>,
+    recent: Arc<Recent>,
+}
+
+impl<T: Message> Clone for Shared<T> {
+    fn clone(&self) -> Shared<T> {
+        Shared { slots: self.slots.clone(), recent: self.recent.clone() }
+    }
+}
+
+/// What was published last. Readers look here only for a message of some time: a link says where its message is.
+struct Recent {
+    /// How many were published.
+    published: AtomicU64,
+    /// The last published, as sequence and slot, at place `sequence % (history + 1)`.
+    links: Box<[AtomicU64]>,
+}
+
+impl Recent {
+    /// How many messages are kept. There is a link more: that of a new message comes before it is counted, and takes none of theirs.
+    #[inline]
+    fn history(&self) -> usize {
+        self.links.len() - 1
+    }
+
+    /// The link to the message with this sequence, if it is still in the history.
+    fn link(&self, sequence: u64) -> Option<Link> {
+        let place = (sequence % self.links.len() as u64) as usize;
+        // Who pins what it leads to sees the content.
+        let seen = self.links[place].load(Ordering::Relaxed);
+        (seen != UNREADABLE && seen >> 24 == sequence & (u64::MAX >> 24))
+            .then_some(Link { sequence, slot: (seen & 0xff_ffff) as u32 })
+    }
+}
 
 /// A link to a slot: what is sent in place of a large message.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -70,24 +138,31 @@ pub(crate) const HELD_BY_A_SEAT: usize = 2;
 
 /// The writing end.
 pub(crate) struct Writer<T: Message> {
-    shared: Arc<Shared<T>>,
-    /// Slots that left the history, or were never used, the oldest first.
-    waiting: std::collections::VecDeque<u32>,
-    history: std::collections::VecDeque<u32>,
+    shared: Shared<T>,
+    order: Order,
+}
+
+/// Where the writer is.
+struct Order {
+    /// All slots, in a circle. From the front on those that left the history, or were never used, the oldest first; behind them the
+    /// history, whose newest lies before the front. So the slot at the front is published where it is.
+    slots: Box<[u32]>,
+    front: usize,
+    /// The sequence of the next message, and the place of its link.
     next: u64,
+    place: usize,
 }
 
 /// A reader's place.
 pub(crate) struct Seat<T: Message> {
-    shared: Arc<Shared<T>>,
-    held: Arc<core::sync::atomic::AtomicU32>,
+    shared: Shared<T>,
+    held: core::sync::atomic::AtomicU32,
 }
 
 /// A slot that is being read.
 pub(crate) struct Pin<'a, T: Message> {
-    shared: &'a Shared<T>,
+    slot: &'a Slot<T>,
     held: &'a core::sync::atomic::AtomicU32,
-    slot: u32,
 }
 
 /// Makes a memory.
@@ -98,31 +173,32 @@ pub(crate) fn memory<T: Message>(form: Form) -> Writer<T> {
         .map(|_| Slot {
             state: AtomicU64::new(UNREADABLE),
             content: UnsafeCell::new(Content {
-                header: Header::default(),
-                head: T::default(),
-                row: vec![T::Element::default(); form.rows].into_boxed_slice(),
                 len: 0,
+                row: vec![T::Element::default(); form.rows].into_boxed_slice(),
+                head: T::default(),
+                header: Header::default(),
             }),
         })
         .collect();
-    let recent = (0..=history).map(|_| AtomicU64::new(UNREADABLE)).collect();
-    let shared = Arc::new(Shared { slots, recent, published: AtomicU64::new(0) });
-    let mut waiting = std::collections::VecDeque::with_capacity(n);
-    waiting.extend(0..n as u32);
-    Writer { shared, waiting, history: std::collections::VecDeque::with_capacity(history + 1), next: 0 }
+    let links = (0..=history).map(|_| AtomicU64::new(UNREADABLE)).collect();
+    let recent = Arc::new(Recent { published: AtomicU64::new(0), links });
+    let order = Order { slots: (0..n as u32).collect(), front: 0, next: 0, place: 0 };
+    Writer { shared: Shared { slots, recent }, order }
 }
 
-/// A slot that is being filled.
+/// A slot that is being filled: the one at the front. One that is dropped instead of being published stays unreadable, which is what
+/// a free one looks like to the writer.
 pub(crate) struct Loan<'a, T: Message> {
-    writer: &'a mut Writer<T>,
-    slot: u32,
-    done: bool,
+    recent: &'a Recent,
+    order: &'a mut Order,
+    slot: &'a Slot<T>,
+    number: u32,
 }
 
 impl<T: Message> Writer<T> {
     /// How many messages stay to be looked up.
     pub(crate) fn history(&self) -> usize {
-        self.shared.history()
+        self.shared.recent.history()
     }
 
     /// How many readers can be seated.
@@ -130,125 +206,90 @@ impl<T: Message> Writer<T> {
         (self.shared.slots.len() - 1 - self.history()) / HELD_BY_A_SEAT
     }
 
-    pub(crate) fn shared(&self) -> Arc<Shared<T>> {
+    pub(crate) fn shared(&self) -> Shared<T> {
         self.shared.clone()
     }
 
     /// Takes a slot to fill. It fails only when readers hold more than their seats allow, which they cannot.
+    #[inline(always)]
     pub(crate) fn loan(&mut self) -> Option<Loan<'_, T>> {
-        for _ in 0..self.waiting.len() {
-            let slot = self.waiting.pop_front()?;
-            let state = &self.shared.slots[slot as usize].state;
-            let seen = state.load(Ordering::Relaxed);
-            // Acquire pairs with the release in `Pin::drop`: the last reader has done reading.
-            let free = seen == UNREADABLE
-                || (seen & PINS == 0
-                    && state
-                        .compare_exchange(
-                            seen,
-                            UNREADABLE,
-                            named("memory: take back", Ordering::Acquire),
-                            Ordering::Relaxed,
-                        )
-                        .is_ok());
-            if free {
-                return Some(Loan { writer: self, slot, done: false });
-            }
-            self.waiting.push_back(slot);
+        let Writer { shared: Shared { slots, recent }, order } = self;
+        let mut number = order.slots[order.front];
+        let mut slot = &slots[number as usize];
+        if !slot.take_back() {
+            number = order.pass_over(recent.history(), |slot| slots[slot as usize].take_back())?;
+            slot = &slots[number as usize];
         }
-        None
+        Some(Loan { recent, order, slot, number })
+    }
+}
+
+impl Order {
+    /// Brings the next slot that can be taken to the front, where the one there is being read: that and others that are go behind all
+    /// that wait.
+    #[cold]
+    fn pass_over(&mut self, history: usize, take: impl Fn(u32) -> bool) -> Option<u32> {
+        let waiting = self.slots.len() - history.min(self.next as usize);
+        let pinned = (1..waiting).find(|i| take(self.slots[self.at(*i)]))?;
+        for (from, to) in [(0, pinned), (pinned, waiting), (0, waiting)] {
+            self.turn(from, to);
+        }
+        Some(self.slots[self.front])
+    }
+
+    /// A place, counted from the front.
+    fn at(&self, i: usize) -> usize {
+        (self.front + i) % self.slots.len()
+    }
+
+    /// Turns a part of it round.
+    fn turn(&mut self, mut from: usize, mut to: usize) {
+        while from + 1 < to {
+            to -= 1;
+            self.slots.swap(self.at(from), self.at(to));
+            from += 1;
+        }
     }
 }
 
 impl<T: Message> Loan<'_, T> {
     /// The parts to fill: the head, and the whole room for the row.
+    #[inline(always)]
     pub(crate) fn parts(&mut self) -> (&mut T, &mut [T::Element]) {
-        self.writer.shared.slots[self.slot as usize].content.with_mut(|content| {
+        self.slot.content.with_mut(|content| {
             // SAFETY: the slot is unreadable and this writer is the only one; the loan is borrowed exclusively.
             let content = unsafe { &mut *content };
             (&mut content.head, &mut content.row[..])
         })
     }
 
-    /// Publishes the slot with `len` elements of its row in use.
-    pub(crate) fn publish(mut self, header: Header, len: usize) -> Link {
-        self.done = true;
-        let (slot, writer) = (self.slot, &mut *self.writer);
-        let sequence = writer.next;
-        writer.next += 1;
-        writer.shared.slots[slot as usize].content.with_mut(|content| {
+    /// Publishes the slot with `len` elements of its row in use, and with the header that `fill` puts there.
+    #[inline(always)]
+    pub(crate) fn publish(self, len: usize, fill: impl FnOnce(&mut Header)) -> Link {
+        let Loan { recent, order, slot, number } = self;
+        let sequence = order.next;
+        slot.content.with_mut(|content| {
             // SAFETY: as in `parts`.
             let content = unsafe { &mut *content };
-            content.header = header;
+            fill(&mut content.header);
             content.len = len.min(content.row.len());
         });
-        // Pairs with the acquire in `Shared::pin`: who pins this sequence sees the content.
-        writer.shared.slots[slot as usize]
-            .state
-            .store(sequence << SEQUENCE_SHIFT, named("memory: publish", Ordering::Release));
-        let place = (sequence % writer.shared.recent.len() as u64) as usize;
-        writer.shared.recent[place].store(sequence << 24 | u64::from(slot), Ordering::Relaxed);
+        // Pairs with the acquire in `Slot::pin`: who pins this sequence sees the content.
+        slot.state.store(sequence << SEQUENCE_SHIFT, named("memory: publish", Ordering::Release));
+        recent.links[order.place].store(sequence << 24 | u64::from(number), Ordering::Relaxed);
         // Pairs with the acquire in `Seat::at`: who sees the number finds the link.
-        writer.shared.published.store(writer.next, named("memory: publish count", Ordering::Release));
-        writer.history.push_back(slot);
-        if writer.history.len() > writer.shared.history()
-            && let Some(old) = writer.history.pop_front()
-        {
-            writer.waiting.push_back(old);
-        }
-        Link { sequence, slot }
+        recent.published.store(sequence + 1, named("memory: publish count", Ordering::Release));
+        order.next = sequence + 1;
+        order.place = behind(order.place, recent.links.len());
+        order.front = behind(order.front, order.slots.len());
+        Link { sequence, slot: number }
     }
 }
 
-impl<T: Message> Drop for Loan<'_, T> {
-    fn drop(&mut self) {
-        if !self.done {
-            // The slot is still unreadable, which is what a free one looks like to the writer.
-            self.writer.waiting.push_front(self.slot);
-        }
-    }
-}
-
-impl<T: Message> Shared<T> {
-    /// Pins the slot if it still holds that message.
-    fn pin(&self, link: Link) -> bool {
-        let state = &self.slots[link.slot as usize].state;
-        let mut seen = state.load(Ordering::Relaxed);
-        loop {
-            if seen == UNREADABLE || seen >> SEQUENCE_SHIFT != link.sequence || seen & PINS == PINS - 1 {
-                return false;
-            }
-            // Acquire pairs with the release in `Loan::publish`; a writer that takes the slot makes the exchange fail.
-            match state.compare_exchange(
-                seen,
-                seen + 1,
-                named("memory: pin", Ordering::Acquire),
-                Ordering::Relaxed,
-            ) {
-                Ok(_) => return true,
-                Err(now) => seen = now,
-            }
-        }
-    }
-
-    fn unpin(&self, slot: u32) {
-        // Pairs with the acquire in `Writer::loan`.
-        self.slots[slot as usize].state.fetch_sub(1, named("memory: unpin", Ordering::Release));
-    }
-
-    /// How many messages are kept. There is a link more: that of a new message comes before it is counted, and takes none of theirs.
-    fn history(&self) -> usize {
-        self.recent.len() - 1
-    }
-
-    /// The link to the message with this sequence, if it is still in the history.
-    fn recent(&self, sequence: u64) -> Option<Link> {
-        let place = (sequence % self.recent.len() as u64) as usize;
-        // Who pins what it leads to sees the content.
-        let seen = self.recent[place].load(Ordering::Relaxed);
-        (seen != UNREADABLE && seen >> 24 == sequence & (u64::MAX >> 24))
-            .then_some(Link { sequence, slot: (seen & 0xff_ffff) as u32 })
-    }
+/// The next place in a circle of so many.
+#[inline]
+fn behind(place: usize, len: usize) -> usize {
+    if place + 1 == len { 0 } else { place + 1 }
 }
 
 /// What a look-up by time found.
@@ -272,22 +313,24 @@ impl<T> Found<T> {
 }
 
 impl<T: Message> Seat<T> {
-    pub(crate) fn new(shared: Arc<Shared<T>>) -> Seat<T> {
-        Seat { shared, held: Arc::default() }
+    pub(crate) fn new(shared: Shared<T>) -> Seat<T> {
+        Seat { shared, held: Default::default() }
     }
 
     /// Reads the message that a link points to; nothing if it has left the memory, or if this seat holds all it may.
+    #[inline]
     pub(crate) fn pin(&self, link: Link) -> Option<Pin<'_, T>> {
         let held = self.held.load(core::sync::atomic::Ordering::Relaxed);
-        if held as usize >= HELD_BY_A_SEAT || !self.shared.pin(link) {
+        let slot = self.shared.slots.get(link.slot as usize)?;
+        if held as usize >= HELD_BY_A_SEAT || !slot.pin(link.sequence) {
             return None;
         }
         self.held.store(held + 1, core::sync::atomic::Ordering::Relaxed);
-        Some(Pin { shared: &self.shared, held: &self.held, slot: link.slot })
+        Some(Pin { slot, held: &self.held })
     }
 
     fn copy(&self, sequence: u64) -> Option<(T, Time)> {
-        let pin = self.pin(self.shared.recent(sequence)?)?;
+        let pin = self.pin(self.shared.recent.link(sequence)?)?;
         Some((*pin.head(), pin.header().stamp))
     }
 
@@ -297,7 +340,7 @@ impl<T: Message> Seat<T> {
         const LOOKS: usize = 16;
         (0..LOOKS).find_map(|_| {
             // Pairs with the release in `Loan::publish`: what was counted is found.
-            let end = self.shared.published.load(named("memory: find count", Ordering::Acquire));
+            let end = self.shared.recent.published.load(named("memory: find count", Ordering::Acquire));
             if end == 0 { Some(None) } else { self.look(time, end).map(Some) }
         })?
     }
@@ -306,7 +349,7 @@ impl<T: Message> Seat<T> {
     fn look(&self, time: Time, end: u64) -> Option<Found<T>> {
         let mut later: Option<(T, Time)> = None;
         let mut sequence = end;
-        while sequence > end.saturating_sub(self.shared.history() as u64) {
+        while sequence > end.saturating_sub(self.shared.recent.history() as u64) {
             sequence -= 1;
             // What the writer has taken back meanwhile, and all before it, is no longer known.
             let Some((value, stamp)) = self.copy(sequence) else { break };
@@ -338,19 +381,22 @@ fn between<T: Message>(earlier: (T, Time), later: Option<(T, Time)>, time: Time)
 }
 
 impl<T: Message> Pin<'_, T> {
+    #[inline]
     fn content(&self) -> &Content<T> {
         // SAFETY: the slot is pinned, so the writer leaves it alone.
-        self.shared.slots[self.slot as usize].content.with(|content| unsafe { &*content })
+        self.slot.content.with(|content| unsafe { &*content })
     }
 
     pub(crate) fn header(&self) -> &Header {
         &self.content().header
     }
 
+    #[inline]
     pub(crate) fn head(&self) -> &T {
         &self.content().head
     }
 
+    #[inline]
     pub(crate) fn row(&self) -> &[T::Element] {
         let content = self.content();
         &content.row[..content.len]
@@ -358,8 +404,9 @@ impl<T: Message> Pin<'_, T> {
 }
 
 impl<T: Message> Drop for Pin<'_, T> {
+    #[inline]
     fn drop(&mut self) {
-        self.shared.unpin(self.slot);
+        self.slot.unpin();
         let held = self.held.load(core::sync::atomic::Ordering::Relaxed);
         self.held.store(held.saturating_sub(1), core::sync::atomic::Ordering::Relaxed);
     }
@@ -369,6 +416,7 @@ impl<T: Message> Drop for Pin<'_, T> {
 #[cfg(not(loom))]
 mod tests {
     use super::*;
+    use std::collections::VecDeque;
     use types::messages::{Image, Odometry, Twist};
     use types::{Duration, Pose};
 
@@ -377,7 +425,7 @@ mod tests {
         let (place, room) = loan.parts();
         *place = head;
         room[..row.len()].copy_from_slice(row);
-        loan.publish(Header { stamp: at, ..Header::default() }, row.len())
+        loan.publish(row.len(), |header| header.stamp = at)
     }
 
     #[test]
@@ -397,6 +445,41 @@ mod tests {
         assert!(seats[0].pin(link).is_some(), "the seat is free again");
     }
 
+    proptest::proptest! {
+        /// Slots are taken as from a queue of those that wait, in which those that are being read go to the end.
+        #[test]
+        fn the_slot_that_waited_longest_is_taken(history in 1usize..4, seats in 0usize..4, ops in proptest::collection::vec((0u8..4, 0usize..64), 0..200)) {
+            let mut writer = memory::<Twist>(Form { history, seats, rows: 0 });
+            let readers: Vec<_> = (0..seats).map(|_| Seat::new(writer.shared())).collect();
+            let mut waiting: VecDeque<u32> = (0..(history + 2 * seats + 1) as u32).collect();
+            let (mut kept, mut links, mut pins) = (VecDeque::new(), Vec::new(), Vec::new());
+            for (op, which) in ops {
+                match op {
+                    0 if seats > 0 && !links.is_empty() => {
+                        let link: Link = links[links.len().saturating_sub(1 + which % 8)];
+                        pins.extend(readers[which % seats].pin(link).map(|pin| (link.slot, pin)));
+                    }
+                    1 if !pins.is_empty() => drop(pins.swap_remove(which % pins.len())),
+                    _ => {
+                        while pins.iter().any(|(slot, _)| *slot == waiting[0]) {
+                            waiting.rotate_left(1);
+                        }
+                        if op == 2 {
+                            let _ = writer.loan();
+                            continue;
+                        }
+                        links.push(publish(&mut writer, Twist::ZERO, Time(0), &[]));
+                        proptest::prop_assert_eq!(links.last().map(|link| link.slot), waiting.pop_front());
+                        kept.extend(links.last().map(|link| link.slot));
+                        if kept.len() > history {
+                            waiting.extend(kept.pop_front());
+                        }
+                    }
+                }
+            }
+        }
+    }
+
     #[test]
     fn a_link_to_what_is_gone_reads_nothing() {
         let mut writer = memory::<Image>(Form { history: 1, seats: 1, rows: 1 });
@@ -412,7 +495,7 @@ mod tests {
     fn a_dropped_loan_gives_its_slot_back() {
         let mut writer = memory::<Twist>(Form { history: 1, seats: 0, rows: 0 });
         for _ in 0..10 {
-            drop(writer.loan().unwrap());
+            let _ = writer.loan().unwrap();
         }
         publish(&mut writer, Twist::ZERO, Time(0), &[]);
     }
@@ -449,7 +532,7 @@ mod model {
     fn write(writer: &mut Writer<Twist>, i: i64) {
         let mut loan = writer.loan().expect("a slot for every loan");
         *loan.parts().0 = Twist::new(i as f64, i as f64);
-        loan.publish(Header { stamp: Time(i), ..Header::default() }, 0);
+        loan.publish(0, |header| header.stamp = Time(i));
     }
 
     fn read(pin: &Pin<'_, Twist>, sequence: u64) {
@@ -466,7 +549,7 @@ mod model {
         weaken::check(&elsewhere, || {
             let mut writer = memory::<Twist>(Form { history: 1, seats: 1, rows: 0 });
             write(&mut writer, 1);
-            let link = writer.shared.recent(0).expect("it was published");
+            let link = writer.shared.recent.link(0).expect("it was published");
             // Half a seat for each.
             let readers = [(); 2].map(|()| {
                 let seat = Seat::new(writer.shared());
@@ -486,7 +569,7 @@ mod model {
             let seat = Seat::new(writer.shared());
             let reader = thread::spawn(move || {
                 for sequence in 0..2 {
-                    if let Some(link) = seat.shared.recent(sequence)
+                    if let Some(link) = seat.shared.recent.link(sequence)
                         && let Some(pin) = seat.pin(link)
                     {
                         read(&pin, sequence);

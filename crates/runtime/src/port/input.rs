@@ -7,6 +7,7 @@ use std::cell::UnsafeCell;
 use std::sync::Arc;
 
 use types::cdr::{NoElement, Writer};
+use types::message::is_large;
 use types::{Header, Message, Priority, Time};
 
 use super::queue::{QueueEnd, QueueForm, Rest, Teller, queue_core};
@@ -215,11 +216,13 @@ pub struct Received<'a, T: Message> {
 
 impl<T: Message> Received<'_, T> {
     /// What it carries besides its payload.
+    #[inline]
     pub fn header(&self) -> &Header {
         self.header
     }
 
     /// The row behind a large message.
+    #[inline]
     pub fn row(&self) -> &[T::Element] {
         match &self.place {
             Place::Value(_) => &[],
@@ -230,6 +233,7 @@ impl<T: Message> Received<'_, T> {
 
 impl<T: Message> core::ops::Deref for Received<'_, T> {
     type Target = T;
+    #[inline]
     fn deref(&self) -> &T {
         match &self.place {
             Place::Value(value) => value,
@@ -244,23 +248,46 @@ impl<T: Message> Input<T> {
     pub fn take(&mut self) -> Option<Received<'_, T>> {
         let core = self.core.as_ref()?;
         let inner = core.inner();
-        // Most inputs have one wire with one priority.
-        if let [lane] = &mut inner.lanes[..]
-            && let Source::Value(receiver) = &mut lane.source
-        {
-            let context = current();
-            if !core::mem::take(&mut lane.staged) && !receiver.advance() {
-                if let Some(context) = context {
-                    context.drained(&mut inner.opened);
+        match &mut inner.lanes[..] {
+            [] => return None,
+            // Most inputs have one wire with one priority.
+            [lane] => match &mut lane.source {
+                Source::Value(receiver) if !is_large::<T>() => {
+                    let context = current();
+                    if !core::mem::take(&mut lane.staged) && !receiver.advance() {
+                        if let Some(context) = context {
+                            context.drained(&mut inner.opened);
+                        }
+                        return None;
+                    }
+                    if let Some(context) = context {
+                        context.took(&mut inner.opened);
+                    }
+                    count(&lane.counts.taken);
+                    let parcel = receiver.current();
+                    return Some(Received { header: &parcel.header, place: Place::Value(&parcel.payload) });
                 }
-                return None;
-            }
-            if let Some(context) = context {
-                context.took(&mut inner.opened);
-            }
-            count(&lane.counts.taken);
-            let parcel = receiver.current();
-            return Some(Received { header: &parcel.header, place: Place::Value(&parcel.payload) });
+                Source::Link(receiver, seat) if is_large::<T>() => {
+                    let context = current();
+                    if !core::mem::take(&mut lane.staged) && !receiver.advance() {
+                        if let Some(context) = context {
+                            context.drained(&mut inner.opened);
+                        }
+                        return None;
+                    }
+                    let parcel = receiver.current();
+                    if let Some(pin) = seat.pin(parcel.payload) {
+                        if let Some(context) = context {
+                            context.took(&mut inner.opened);
+                        }
+                        count(&lane.counts.taken);
+                        return Some(Received { header: &parcel.header, place: Place::Pinned(pin) });
+                    }
+                    count(&lane.counts.expired);
+                }
+                _ => {}
+            },
+            _ => {}
         }
         core.inner().take()
     }
@@ -319,7 +346,12 @@ impl<T: Message> InputInner<T> {
     #[inline(never)]
     fn take(&mut self) -> Option<Received<'_, T>> {
         loop {
-            let lane = self.next()?;
+            let Some(lane) = self.next() else {
+                if let Some(context) = current() {
+                    context.drained(&mut self.opened);
+                }
+                return None;
+            };
             // The borrow ends here when the message is gone, and the search goes on.
             let lane: *const Lane<T> = &raw const self.lanes[lane];
             // SAFETY: lanes change only between steps; `&mut self` keeps the message from being taken twice.

@@ -52,9 +52,7 @@ struct OutputInner<T: Message> {
 impl<T: Message> OutputInner<T> {
     /// After a change of what it has.
     fn changed(&mut self) {
-        self.is_plain = self.memory.is_none()
-            && self.faulty.is_none()
-            && matches!(&self.routes[..], [only] if only.is_plain());
+        self.is_plain = self.faulty.is_none() && matches!(&self.routes[..], [only] if only.is_plain());
     }
 }
 
@@ -66,7 +64,7 @@ pub(crate) struct OutputCore<T: Message> {
     inner: UnsafeCell<OutputInner<T>>,
     log_number: AtomicU64,
     /// What the readers of its memory share, and on how many seats: the memory of an output is never replaced.
-    shared: Option<(Arc<memory::Shared<T>>, usize)>,
+    shared: Option<(memory::Shared<T>, usize)>,
     /// The greatest length of the row of a message.
     rows: usize,
 }
@@ -122,6 +120,7 @@ impl<T: Message> OutputEnd for OutputCore<T> {
         let room = Vec::with_capacity(lanes + new_lanes.len());
         let lanes = Box::new(NewLanes { lanes: new_lanes, room });
         let way = match self.shared {
+            Some(_) if links.len() == 1 => links.pop().map_or(Way::Links(links), |(_, only)| Way::Link(only)),
             Some(_) => Way::Links(links),
             None if values.len() == 1 => {
                 values.pop().map_or(Way::Values(values), |(_, only)| Way::Value(only))
@@ -237,6 +236,16 @@ impl Default for Envelope {
     }
 }
 
+impl Envelope {
+    /// Fills in a header, word by word: one that is put together elsewhere and copied takes longer than a small payload.
+    #[inline(always)]
+    fn put(&self, header: &mut Header, stamp: Time, sequence: u64, sender: AgentId) {
+        (header.stamp, header.sequence, header.deadline) = (stamp, sequence, self.deadline);
+        (header.sender, header.recipient, header.marker) = (sender, self.recipient, self.marker);
+        (header.category, header.priority) = (self.category, self.priority);
+    }
+}
+
 /// An end where messages of type `T` go out.
 pub struct Output<T: Message> {
     core: Option<Arc<OutputCore<T>>>,
@@ -313,6 +322,7 @@ impl<T: Message> Output<T> {
             core.inner().routes.iter().all(|route| match &route.way {
                 Way::Value(ring) => ring.has_room(),
                 Way::Values(rings) => rings.iter().all(|(_, ring)| ring.has_room()),
+                Way::Link(ring) => ring.has_room(),
                 Way::Links(rings) => rings.iter().all(|(_, ring)| ring.has_room()),
                 Way::Queue(queue) => queue.has_room(),
             })
@@ -354,26 +364,41 @@ impl<T: Message> OutputCore<T> {
         let (sequence, sender) = (inner.sequence, inner.sender);
         inner.sequence += 1;
         self.sent.store(inner.sequence, Ordering::Relaxed);
-        let Envelope { deadline, recipient, marker, category, priority, .. } = envelope;
         if inner.is_plain
             && self.log_every.load(Ordering::Relaxed) == 0
             && let [route] = &mut inner.routes[..]
-            && let Way::Value(ring) = &mut route.way
         {
-            let pushed = ring.push(|parcel| {
-                // Word by word: a header that is put together elsewhere and copied here takes longer than the payload.
-                let header = &mut parcel.header;
-                (header.stamp, header.sequence, header.deadline) = (stamp, sequence, deadline);
-                (header.sender, header.recipient, header.marker) = (sender, recipient, marker);
-                (header.category, header.priority) = (category, priority);
-                fill(&mut parcel.payload, &mut []);
-            });
-            return route.account(pushed, Sent::default(), context);
+            if !is_large::<T>()
+                && let Way::Value(ring) = &mut route.way
+            {
+                let pushed = ring.push(|parcel| {
+                    envelope.put(&mut parcel.header, stamp, sequence, sender);
+                    fill(&mut parcel.payload, &mut []);
+                });
+                return route.account(pushed, Sent::default(), context);
+            }
+            if is_large::<T>()
+                && let Way::Link(ring) = &mut route.way
+                && let Some(memory) = &mut inner.memory
+            {
+                let Some(mut loan) = memory.loan() else { return Sent::default() };
+                let (head, row) = loan.parts();
+                let len = fill(head, row);
+                let link = loan.publish(len, |header| envelope.put(header, stamp, sequence, sender));
+                let pushed = ring.push(|parcel| {
+                    envelope.put(&mut parcel.header, stamp, sequence, sender);
+                    parcel.payload = link;
+                });
+                return route.account(pushed, Sent::default(), context);
+            }
         }
+        let Envelope { deadline, recipient, marker, category, priority, .. } = envelope;
         let header = Header { stamp, sequence, deadline, sender, recipient, marker, category, priority };
         self.send_any(&header, fill, context)
     }
 
+    /// Not the usual way: said to be cold, so that what stands before the call is inlined, as it is short.
+    #[cold]
     #[inline(never)]
     fn send_any(
         &self,
@@ -472,7 +497,7 @@ impl<T: Message> OutputCore<T> {
                 }
             }
         }
-        let link = loan.publish(*header, len);
+        let link = loan.publish(len, |place| *place = *header);
         for route in inner.routes.iter_mut().filter(|route| !route.leads_to_queue()) {
             if route.lets_pass(header) {
                 route.put_link(header, link, &mut sent, context);

@@ -41,6 +41,7 @@ pub(super) enum Way<T: Message> {
     /// Most outputs use one priority.
     Value(ring::Sender<Parcel<T>>),
     Values(Vec<(Priority, ring::Sender<Parcel<T>>)>),
+    Link(ring::Sender<Parcel<Link>>),
     Links(Vec<(Priority, ring::Sender<Parcel<Link>>)>),
     Queue(Box<queue::Sender<Parcel<T>>>),
 }
@@ -68,7 +69,7 @@ impl<T: Message> Route<T> {
 
     /// Whether it takes all messages as they are, with one priority.
     pub(super) fn is_plain(&self) -> bool {
-        self.takes_all && matches!(self.way, Way::Value(_))
+        self.takes_all && matches!(self.way, Way::Value(_) | Way::Link(_))
     }
 
     pub(super) fn leads_to_queue(&self) -> bool {
@@ -80,6 +81,7 @@ impl<T: Message> Route<T> {
         fetch(&raw const *self.counts, 1);
         match &self.way {
             Way::Value(ring) => ring.fetch(),
+            Way::Link(ring) => ring.fetch(),
             Way::Values(_) | Way::Links(_) | Way::Queue(_) => {}
         }
     }
@@ -111,7 +113,7 @@ impl<T: Message> Route<T> {
         let ring = match &mut self.way {
             Way::Value(ring) => Some(ring),
             Way::Values(rings) => lane_for(rings, header.priority),
-            Way::Links(_) | Way::Queue(_) => None,
+            Way::Link(_) | Way::Links(_) | Way::Queue(_) => None,
         };
         let pushed = match ring {
             Some(ring) => ring.push(|parcel| {
@@ -131,6 +133,7 @@ impl<T: Message> Route<T> {
         context: Option<&Context>,
     ) {
         let ring = match &mut self.way {
+            Way::Link(ring) => Some(ring),
             Way::Links(rings) => lane_for(rings, header.priority),
             _ => None,
         };
@@ -141,7 +144,7 @@ impl<T: Message> Route<T> {
         *sent = self.account(pushed, *sent, context);
     }
 
-    #[inline]
+    #[inline(always)]
     pub(super) fn account(&mut self, pushed: Pushed, mut sent: Sent, context: Option<&Context>) -> Sent {
         match pushed {
             Pushed::Stored => {}
