@@ -61,6 +61,9 @@ pub(crate) struct RunArgs {
     /// How many times as fast as real time: a number, or max. 10 on a terminal, else max.
     #[arg(long, value_name = "N|max")]
     pub(crate) speed: Option<Speed>,
+    /// In simulated time, lets each step take the cost that the file declares, on so many virtual processors; else steps take no time.
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u8).range(1..=64))]
+    pub(crate) processors: Option<u8>,
     /// How long at most, as in 300s; else as long as the goal gives.
     #[arg(long = "for", value_name = "TIME", value_parser = duration)]
     pub(crate) limit: Option<Duration>,

@@ -5,6 +5,7 @@
 
 mod change;
 mod due;
+mod played;
 mod ready;
 mod serving;
 mod step;
@@ -152,6 +153,8 @@ pub(crate) struct Core {
     checks: Checks,
     /// How many stalls the witness had seen after the last step.
     stalls: u64,
+    /// Since when agents are ready, by slot, where steps take time on a virtual processor: then who plays it counts them when they end.
+    ready_since: Option<Vec<Time>>,
 }
 
 /// How many changes or answers can be under way.
@@ -191,6 +194,7 @@ impl Core {
             rate: rate(os::nanos_per_tick()),
             checks: Checks::default(),
             stalls: 0,
+            ready_since: None,
         };
         (core, Link { changes: change_in, answers: answer_out, given: 0, door, running })
     }

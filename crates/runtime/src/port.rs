@@ -252,6 +252,10 @@ pub(crate) trait OutputEnd: Any + Send + Sync {
     fn prepare_message(&self, bytes: &[u8]) -> Result<Box<dyn Any + Send>, types::cdr::Error>;
     /// Sends a message that was prepared by an output of the same type.
     fn send_prepared(&self, envelope: &Envelope, message: &(dyn Any + Send));
+    /// From now on keeps back what is sent, until [`release`](Self::release).
+    fn hold(&self);
+    /// Sends what was kept back, in its order, and keeps nothing back any more.
+    fn release(&self);
     /// An input of the same type that belongs to no agent: for a caller from outside.
     fn facing(&self) -> Arc<dyn InputEnd>;
     /// A queue of such messages; nothing where they are large.

@@ -307,6 +307,15 @@ impl Router {
         self.seated(executor, slot).map_or(LEAST_HANG, |known| known.timing.hang_after)
     }
 
+    /// The agent in a slot, where it sends, and the processor time of its step.
+    pub(crate) fn played(&self, executor: usize, slot: u32) -> (AgentId, Vec<Arc<dyn OutputEnd>>, Duration) {
+        let Some(known) = self.seated(executor, slot) else {
+            return (AgentId::NONE, Vec::new(), Duration::ZERO);
+        };
+        let outputs = known.ends.iter().filter_map(|ends| ends.output.clone());
+        (known.id, outputs.collect(), known.plan.cost.unwrap_or(Duration::ZERO))
+    }
+
     /// Who sits in a slot.
     fn seated(&self, executor: usize, slot: u32) -> Option<&Known> {
         let id = self.executors[executor].slots.get(slot as usize).copied().flatten()?;

@@ -3,6 +3,8 @@
 
 #![allow(unsafe_code)]
 
+mod busy;
+
 use core::sync::atomic::{AtomicBool, Ordering};
 use std::sync::Arc;
 use std::sync::mpsc::{Receiver, sync_channel};
@@ -10,9 +12,10 @@ use std::time::Duration as HostDuration;
 
 use types::{Duration, Time};
 
+use self::busy::Busy;
 use crate::agent::Registry;
 use crate::context::{Context, install_panic_hook};
-use crate::executor::{Core, Ended};
+use crate::executor::{Core, Ended, Job};
 use crate::handover::Running;
 use crate::log::LogThread;
 use crate::os;
@@ -113,6 +116,8 @@ struct Player {
     blocked: Vec<Time>,
     /// Agents that hang: when they are given up, their executor and slot.
     hung: Vec<(Time, usize, u32)>,
+    /// Where steps take time.
+    busy: Option<Box<Busy>>,
     incidents_seen: usize,
     /// When requests of agents were decided last.
     decided: Time,
@@ -124,7 +129,7 @@ fn play(simulation: Simulation) -> Result<Report, CannotRun> {
     drop(control);
     let Built { router, cores, directory } = built;
     let (writer, reader) = trace::ring(trace::LARGE, true);
-    let Options { limit, speed, recorder, mut observer, .. } = options;
+    let Options { limit, speed, recorder, mut observer, processors, .. } = options;
     let log_shared = router.log_shared.clone();
     let log = LogThread::start(log_shared, vec![reader], recorder, directory.clone())?;
     let mut order: Vec<usize> = (0..cores.len()).collect();
@@ -139,10 +144,16 @@ fn play(simulation: Simulation) -> Result<Report, CannotRun> {
         now: Time::ZERO,
         blocked,
         hung: Vec::new(),
+        busy: None,
         incidents_seen: 0,
         decided: Time(i64::MIN),
     };
 
+    if let Some(count) = processors {
+        player.cores.iter_mut().for_each(Core::count_elsewhere);
+        let executors = player.router.executors.iter().map(|executor| &executor.plan);
+        player.busy = Some(Box::new(Busy::new(count, executors)));
+    }
     let entered = player.context.enter();
     let begun = os::monotonic();
     let end = limit.map_or(Time::NEVER, |limit| Time::ZERO + limit);
@@ -230,6 +241,11 @@ enum Paced {
 impl Player {
     /// Does everything that is to be done at this instant.
     fn instant(&mut self) -> Result<(), CannotRun> {
+        if let Some(mut busy) = self.busy.take() {
+            let done = self.busy_instant(&mut busy);
+            self.busy = Some(busy);
+            return done;
+        }
         let mut steps = 0u64;
         'again: loop {
             for place in 0..self.order.len() {
@@ -248,9 +264,7 @@ impl Player {
                         }
                         break;
                     };
-                    let mut moment = Moment::simulated(self.now);
-                    // SAFETY: the core lives in this thread's own array, and nobody else takes it.
-                    let ended = unsafe { Core::run(core, &self.context, job, &mut moment, None, || true) };
+                    let ended = self.step(at, job);
                     steps += 1;
                     if steps > STEPS_AT_ONCE * (1 + self.router.agents_count() as u64) {
                         return Err(self.endless());
@@ -272,6 +286,15 @@ impl Player {
         }
     }
 
+    /// Makes a step of an agent of an executor.
+    #[inline(always)]
+    fn step(&mut self, executor: usize, job: Job) -> Option<Ended> {
+        let core = &mut self.cores[executor];
+        let mut moment = Moment::simulated(self.now);
+        // SAFETY: the core lives in this thread's own array, and nobody else takes it.
+        unsafe { Core::run(core, &self.context, job, &mut moment, None, || true) }
+    }
+
     /// Whether somebody has rung at an executor that goes before this one and is not kept busy.
     fn is_rung_before(&self, place: usize) -> bool {
         self.order[..place].iter().any(|at| self.blocked[*at] <= self.now && self.cores[*at].door.is_rung())
@@ -289,6 +312,11 @@ impl Player {
         let due: Vec<_> = self.hung.iter().filter(|(at, _, _)| *at <= now).copied().collect();
         self.hung.retain(|(at, _, _)| *at > now);
         for (_, executor, slot) in due {
+            if let Some(mut busy) = self.busy.take() {
+                busy.give_up(executor);
+                self.end(&mut busy, executor);
+                self.busy = Some(busy);
+            }
             self.cores[executor].give_up(slot, now);
         }
     }
@@ -298,7 +326,8 @@ impl Player {
         let mut agents = Vec::new();
         for _ in 0..64 {
             for place in 0..self.order.len() {
-                let core = &mut self.cores[self.order[place]];
+                let at = self.order[place];
+                let core = &mut self.cores[at];
                 let _ = core.look_at_door();
                 let Some(job) = core.next(self.now) else { continue };
                 if let Some(seat) = core.seats[job.slot as usize].as_ref() {
@@ -307,9 +336,7 @@ impl Player {
                         agents.push(name);
                     }
                 }
-                let mut moment = Moment::simulated(self.now);
-                // SAFETY: as in `instant`.
-                unsafe { Core::run(core, &self.context, job, &mut moment, None, || true) };
+                self.step(at, job);
                 break;
             }
         }
@@ -403,6 +430,11 @@ impl Player {
 
     fn next_event(&self) -> Time {
         let hung = self.hung.iter().map(|(at, _, _)| *at).min().unwrap_or(Time::NEVER);
+        if let Some(busy) = &self.busy {
+            let free = self.cores.iter().enumerate().filter(|(at, _)| !busy.is_busy(*at));
+            let releases = free.map(|(_, core)| core.next_release());
+            return releases.min().unwrap_or(Time::NEVER).min(hung).min(busy.next_end());
+        }
         let releases =
             self.cores.iter().zip(&self.blocked).map(|(core, blocked)| core.next_release().max(*blocked));
         releases.min().unwrap_or(Time::NEVER).min(hung)
@@ -428,6 +460,9 @@ impl Player {
     }
 
     fn stop(&mut self) {
+        if let Some(mut busy) = self.busy.take() {
+            self.end_all(&mut busy);
+        }
         let mut fabric = Still { cores: &mut self.cores, context: &self.context, now: self.now };
         self.router.stop_all(&mut fabric);
     }

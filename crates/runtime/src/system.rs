@@ -131,6 +131,9 @@ pub struct Options {
     pub log: LogChoice,
     /// Who watches.
     pub observer: Box<dyn Observer>,
+    /// In simulated time: on how many virtual processors steps take the costs that the plan declares; none takes any time when nothing
+    /// is said.
+    pub processors: Option<usize>,
     /// How a timed request of the plan, in words, becomes a request.
     pub parse: fn(&[String]) -> Result<Request, Refusal>,
 }
@@ -143,6 +146,7 @@ impl Default for Options {
             recorder: None,
             log: LogChoice::default(),
             observer: Box::new(NoObserver),
+            processors: None,
             parse: |words| Err(Refusal::new(format!("\"{}\" cannot be asked here", words.join(" ")))),
         }
     }

@@ -145,9 +145,8 @@ impl Processors {
 
     /// Goes on to the first instant at which a job ends, but not beyond `until`. The threads whose jobs ended; none when `until` came first.
     pub fn advance(&mut self, until: i128) -> &[usize] {
-        let left = |thread: &usize| self.threads[*thread].job.map_or(0, |job| job.left);
-        let shortest = self.running.iter().flatten().map(left).min();
-        let step = shortest.map_or(until - self.now, |left| left.min(until - self.now)).max(0);
+        let end = self.next_end().unwrap_or(until).min(until);
+        let step = (end - self.now).max(0);
         self.ended.clear();
         for cpu in 0..self.count {
             let Some(thread) = self.running[cpu] else { continue };
@@ -163,6 +162,21 @@ impl Processors {
         }
         self.now += step;
         &self.ended
+    }
+
+    /// When the first of those that run ends, if nothing comes between; nothing where nobody runs.
+    pub fn next_end(&self) -> Option<i128> {
+        let left = |thread: &usize| self.threads[*thread].job.map_or(0, |job| job.left);
+        self.running.iter().flatten().map(left).min().map(|left| self.now.saturating_add(left))
+    }
+
+    /// Takes a thread's job away, done or not.
+    pub fn cancel(&mut self, thread: usize) {
+        self.threads[thread].job = None;
+        self.running
+            .iter_mut()
+            .filter(|running| **running == Some(thread))
+            .for_each(|running| *running = None);
     }
 
     /// Who ran when, as far as it was kept and not taken yet.

@@ -33,9 +33,12 @@ pub(crate) struct AnalyzeArgs {
     /// Changes an entry of a system file first, as in agent.wall.period=100ms.
     #[arg(long, value_name = "KEY=VALUE")]
     set: Vec<String>,
-    /// For a task set: so many processors. Tasks that name none go to the first on which all meet their deadlines.
+    /// So many processors. Tasks of a set that name none go to the first on which all meet their deadlines; a system is played on them.
     #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u8).range(1..=64))]
     processors: u8,
+    /// For a system: plays it so long in simulated time, where its steps take their execution times, and shows the longest responses.
+    #[arg(long, value_name = "TIME", value_parser = cli::duration)]
+    play: Option<Duration>,
     /// For a task set: how much of a schedule the picture shows; else some 25 of the shortest periods.
     #[arg(long = "for", value_name = "TIME", value_parser = cli::duration)]
     length: Option<Duration>,
@@ -57,6 +60,10 @@ pub(crate) struct AnalyzeArgs {
 pub(crate) fn analyze(args: &AnalyzeArgs, registry: &Registry, json: bool) -> Result<ExitCode, Failure> {
     let Some(name) = &args.system else { return paper::paper(args, json) };
     let report = match task_set(name)? {
+        Some(_) if args.play.is_some() => {
+            return Err(Failure::new(format!("--play is for systems; {name} is a bare task set"))
+                .help("its picture shows its schedule"));
+        }
         Some((text, file)) => set::analyse(&tasks::read(&text, &file)?, args)?,
         None => system::analyse(name, args, registry)?,
     };

@@ -22,6 +22,9 @@ pub(super) struct Row {
     pub response: Option<Exact>,
     /// Whether it must meet its deadline.
     pub counts: bool,
+    /// The longest response when it was played, and when it was measured (s).
+    pub played: Option<f64>,
+    pub measured: Option<f64>,
     pub least_period: Option<f64>,
     pub cost_factor: Option<f64>,
     /// For people: what makes it run, where that is not a clock.
@@ -170,8 +173,14 @@ impl Report {
     }
 
     fn tasks(&self) -> String {
-        let head =
+        let title = |title: &str, column: fn(&Row) -> Option<f64>| {
+            let is_used = self.rows.iter().any(|row| column(row).is_some());
+            if is_used { title.to_owned() } else { String::new() }
+        };
+        let (played, measured) = (title("played", |row| row.played), title("measured", |row| row.measured));
+        let [a, b, c, d, e, f, g, h, i] =
             ["", "priority", "", "C", "T", "D", "response", "least T", "C may grow"].map(str::to_owned);
+        let head = [a, b, c, d, e, f, g, played, measured, h, i];
         let several = self.rows.iter().any(|row| row.processor.is_some());
         let mut rows = vec![head];
         for row in &self.rows {
@@ -191,6 +200,8 @@ impl Report {
                 row.period.map_or("-".to_owned(), |time| people(nanos(time))),
                 people(nanos(row.deadline)),
                 response,
+                row.played.map_or(String::new(), |time| people(time * 1e9)),
+                row.measured.map_or(String::new(), |time| people(time * 1e9)),
                 row.least_period.map_or("-".to_owned(), people),
                 row.cost_factor.map_or("-".to_owned(), |factor| format!("× {factor:.3}")),
             ]);
@@ -225,6 +236,8 @@ fn row_json(row: &Row) -> Json {
         "priority": row.priority,
         "processor": row.processor,
         "response": row.response.map(seconds),
+        "played": row.played,
+        "measured": row.measured,
         "t_min": row.least_period.map(|nanos| nanos / 1e9),
         "c_factor": row.cost_factor,
     })

@@ -42,6 +42,8 @@ pub(super) fn analyse(set: &Set, args: &AnalyzeArgs) -> Result<Report, Failure> 
                 processor: several.then_some(processor),
                 response: response.meets.then_some(response.at_worst),
                 counts: true,
+                played: None,
+                measured: None,
                 least_period: least_period(part, at).map(|least| super::report::seconds(least) * 1e9),
                 cost_factor: largest_cost_factor(part, Some(at)),
                 remark: String::new(),

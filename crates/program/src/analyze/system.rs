@@ -4,7 +4,9 @@ use std::collections::BTreeMap;
 use std::path::Path;
 
 use hardware::robot::CYCLE;
-use runtime::{AgentPlan, Assumed, Registry, Timetable, owner, timetable, wires_of};
+use runtime::{
+    AgentPlan, Assumed, CannotRun, Options, Registry, Simulation, Timetable, owner, timetable, wires_of,
+};
 use schedule::sensitivity::largest;
 use schedule::system::{Found, Source, System, Unsound};
 use schedule::{Exact, Task, TaskSet};
@@ -15,7 +17,7 @@ use super::report::{Chain, Part, Report, Row, SHOWN_CHAINS};
 use super::{AnalyzeArgs, set};
 use crate::error::Failure;
 use crate::file;
-use crate::run::{Ready, Scenario, with_robots};
+use crate::run::{Ready, Scenario, failure, with_robots};
 
 /// Chains have no more agents than this, and there are no more of them.
 const LONGEST_CHAIN: usize = 12;
@@ -23,9 +25,7 @@ const MOST_CHAINS: usize = 256;
 
 /// Analyses a system file or a scenario.
 pub(super) fn analyse(name: &str, args: &AnalyzeArgs, registry: &Registry) -> Result<Report, Failure> {
-    for (is, option) in
-        [(args.processors != 1, "--processors"), (args.edf, "--edf"), (args.length.is_some(), "--for")]
-    {
+    for (is, option) in [(args.edf, "--edf"), (args.length.is_some(), "--for")] {
         if is {
             return Err(Failure::new(format!("{option} is for bare task sets; {name} is a system"))
                 .help("its executors say where they run"));
@@ -34,7 +34,38 @@ pub(super) fn analyse(name: &str, args: &AnalyzeArgs, registry: &Registry) -> Re
     let registry = with_robots(registry.clone());
     let file = file::check(name, &args.set, &registry)?;
     let measured = args.from.as_deref().map(Measured::read).transpose()?;
-    report(&Scenario { file, registry }.prepare(1)?, measured)
+    let sources = file.sources.clone();
+    let ready = Scenario { file, registry }.prepare(1)?;
+    let mut report = report(&ready, measured)?;
+    if let Some(limit) = args.play {
+        let played = play(ready, &mut report, limit, args.processors.into());
+        played.map_err(|error| failure(error, &sources))?;
+    }
+    Ok(report)
+}
+
+/// Plays it with the execution times of the report, and puts the longest responses beside the analysed ones.
+fn play(mut ready: Ready, report: &mut Report, limit: Duration, processors: usize) -> Result<(), CannotRun> {
+    for (agent, row) in ready.plan.agents.iter_mut().zip(&report.rows) {
+        agent.cost = Some(Duration(row.cost.ceil().to_integer() as i64));
+    }
+    let options = Options {
+        limit: Some(limit),
+        processors: Some(processors),
+        parse: control::words::parse,
+        ..Options::default()
+    };
+    let played = Simulation::new(&ready.plan, &ready.registry, options)?.run()?;
+    for row in &mut report.rows {
+        let agent = played.view.agents.iter().find(|agent| agent.name == row.name);
+        row.played = agent.filter(|agent| agent.response.n > 0).map(|agent| agent.response.max * 1e-9);
+    }
+    let on = match processors {
+        1 => "one virtual processor".to_owned(),
+        several => format!("{several} virtual processors"),
+    };
+    report.notes.push(format!("played: the longest response in {limit} on {on}"));
+    Ok(())
 }
 
 fn report(ready: &Ready, measured: Option<Measured>) -> Result<Report, Failure> {
@@ -69,6 +100,9 @@ fn report(ready: &Ready, measured: Option<Measured>) -> Result<Report, Failure> 
         ));
     }
     if let Some(measured) = &measured {
+        for row in &mut report.rows {
+            row.measured = measured.responses.get(&row.name).copied();
+        }
         report.notes.push(format!("execution times: the longest steps in {}", measured.file));
         if measured.clock == "sim" {
             let what = "in simulated time nobody leaves out of a step what the machine did otherwise: a run with --clock wall measures better";
@@ -174,6 +208,8 @@ fn rows(ready: &Ready, table: &Timetable, found: &[Found]) -> Vec<Row> {
             processor: None,
             response: found.response.filter(|_| found.meets),
             counts,
+            played: None,
+            measured: None,
             least_period,
             cost_factor: factor,
             remark: match (&executor.name, waits_for.as_slice()) {
@@ -221,7 +257,7 @@ fn parts(table: &Timetable, found: &[Found]) -> Vec<Part> {
         };
         let meets = members.iter().all(|at| found[*at].meets);
         let mut part = Part { response_time: meets, ..set::part_of(name, &set) };
-        part.edf.why += ", nobody late";
+        part.edf.why = part.edf.why.replace(" at all times", ", nobody late");
         Some(part)
     };
     groups.iter().filter_map(part).collect()
@@ -276,6 +312,8 @@ struct Measured {
     /// The clock of the run.
     clock: String,
     costs: BTreeMap<String, Duration>,
+    /// The longest responses (s).
+    responses: BTreeMap<String, f64>,
 }
 
 impl Measured {
@@ -297,18 +335,23 @@ impl Measured {
         };
         let document: Json = serde_json::from_str(&text).map_err(|error| wrong(&error.to_string()))?;
         let agents = document["agents"].as_array().ok_or_else(|| wrong("it has no list \"agents\""))?;
-        let mut costs = BTreeMap::new();
+        let (mut costs, mut responses) = (BTreeMap::new(), BTreeMap::new());
         for agent in agents {
             let name = agent["name"].as_str().ok_or_else(|| wrong("an agent has no name"))?;
             let figure = &agent["exec"];
             let longest =
                 figure["max"].as_f64().ok_or_else(|| wrong(&format!("of {name} it has no exec.max")))?;
+            let response = &agent["response"];
+            let longest_response = response["max"].as_f64().filter(|_| response["n"].as_u64() > Some(0));
+            if let Some(longest) = longest_response {
+                responses.insert(name.to_owned(), longest * unit_of(response));
+            }
             if figure["n"].as_u64() > Some(0) {
                 costs.insert(name.to_owned(), Duration::from_seconds(longest * unit_of(figure)));
             }
         }
         let clock = document["clock"].as_str().unwrap_or_default().to_owned();
-        Ok(Measured { file: shown, clock, costs })
+        Ok(Measured { file: shown, clock, costs, responses })
     }
 }
 
@@ -326,6 +369,8 @@ fn unit_of(figure: &Json) -> f64 {
 mod tests {
     use runtime::{Agent, Fault, Input, Output, Step, registry};
     use types::messages::Twist;
+
+    use crate::analyze::report::seconds;
 
     use super::*;
 
@@ -402,7 +447,8 @@ executor = "low"
     #[test]
     fn measured_times_count_and_unknown_ones_are_named() {
         let costs = [("source".to_owned(), Duration::millis(9))].into();
-        let measured = Measured { file: "timing.json".into(), clock: "wall".into(), costs };
+        let measured =
+            Measured { file: "timing.json".into(), clock: "wall".into(), costs, responses: BTreeMap::new() };
         let text = THREE.replace("cost = \"1ms\"\n", "");
         let report = read(&text, Some(measured)).unwrap();
         assert!(!report.pass());
@@ -412,6 +458,27 @@ executor = "low"
             report.notes
         );
         assert!(report.notes.contains(&"source took 9ms where 3ms is declared".to_owned()));
+    }
+
+    /// No agent of a scenario takes longer on virtual processors than the analysis says.
+    #[test]
+    fn scenarios_take_no_longer_than_analysed() {
+        for (name, processors, millis) in
+            [("exploration", 1, 12_000), ("exploration", 2, 6_000), ("annex", 1, 6_000)]
+        {
+            let registry = with_robots(agents::registry());
+            let file = file::load(name, &[], &registry).unwrap();
+            let scenario = Scenario { file, registry };
+            let ready = scenario.prepare(1).unwrap();
+            let mut told = report(&ready, None).unwrap();
+            assert!(told.pass(), "{name}");
+            play(ready, &mut told, Duration::millis(millis), processors).unwrap();
+            for row in &told.rows {
+                let (played, told) = (row.played.unwrap(), row.response.map(seconds).unwrap());
+                assert!(played <= told + 1e-12, "{name}, {}: {played} s, told {told} s", row.name);
+                assert!(played >= seconds(row.cost), "{name}, {}", row.name);
+            }
+        }
     }
 
     #[test]

@@ -170,6 +170,7 @@ impl One<'_> {
             },
             recorder,
             observer: Box::new(judge),
+            processors: self.args.processors.map(usize::from),
             parse: control::words::parse,
         };
         let report = self.play(&ready, &plan, &asked, options)?;

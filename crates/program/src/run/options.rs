@@ -114,6 +114,10 @@ pub(super) fn clock(args: &RunArgs, ready: &Ready) -> Result<ClockChoice, Failur
         Some(ClockChoice::Wall) if args.speed.is_some() => {
             Err(Failure::new("the wall clock has one speed").help("--speed goes with --clock sim"))
         }
+        Some(ClockChoice::Wall) if args.processors.is_some() => {
+            Err(Failure::new("on the wall clock steps take the time that they take")
+                .help("--processors goes with --clock sim"))
+        }
         Some(clock) => Ok(clock),
         None if ready.needs_wall => Ok(ClockChoice::Wall),
         None => Ok(ClockChoice::Sim),

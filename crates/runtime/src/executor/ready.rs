@@ -104,6 +104,14 @@ impl ReadySet {
         self.only == NOBODY && self.set == 0
     }
 
+    /// Whether the agent in this slot is ready.
+    pub(super) fn is_marked(&self, slot: u32) -> bool {
+        self.rank_of(slot).is_some_and(|rank| {
+            self.only == rank
+                || self.words.get(rank as usize / 64).is_some_and(|word| word >> (rank % 64) & 1 == 1)
+        })
+    }
+
     /// Takes the slot of the first that is ready behind the one taken last, or of the first of all.
     #[inline]
     pub(super) fn take(&mut self) -> Option<u32> {

@@ -296,6 +296,9 @@ impl Core {
         seat.in_step = false;
         let alarm = context.end();
         self.mark_woken(context);
+        if self.ready_since.is_some() {
+            return alarm;
+        }
         let took = match watch {
             Some(_) => nanos(ended.time - begun.time),
             // In simulated time a step takes none; what it took of the host's is counted.
@@ -465,7 +468,7 @@ fn unusual(special: Special, body: &mut dyn Body, turn: &mut Turn, before: u64) 
 /// Counts a step that ended behind its deadline, and notes in the log what was to blame: the greatest part of what it took from its release
 /// on. `own` is what it used of its processor (ns).
 #[cold]
-fn missed(
+pub(super) fn missed(
     context: &Context,
     seat: &Seat,
     job: Job,

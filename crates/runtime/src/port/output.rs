@@ -3,6 +3,7 @@
 #![allow(unsafe_code)]
 
 mod chosen;
+mod held;
 
 use core::sync::atomic::{AtomicU64, Ordering};
 use std::any::Any;
@@ -14,6 +15,7 @@ use types::chance::Stream;
 use types::message::is_large;
 use types::{AgentId, Category, Header, Message, Priority, Time};
 
+use self::held::Held;
 use super::faulty::Faulty;
 use super::input::{Lane, NewLanes, Source};
 use super::queue::{QueueEnd, QueueForm, queue_core};
@@ -47,12 +49,15 @@ struct OutputInner<T: Message> {
     /// How it misbehaves, if it does.
     faulty: Option<Box<Faulty<T>>>,
     memory: Option<memory::Writer<T>>,
+    /// What is kept back, where that is done.
+    held: Option<Box<Held<T>>>,
 }
 
 impl<T: Message> OutputInner<T> {
     /// After a change of what it has.
     fn changed(&mut self) {
-        self.is_plain = self.faulty.is_none() && matches!(&self.routes[..], [only] if only.is_plain());
+        let is_usual = self.faulty.is_none() && self.held.is_none();
+        self.is_plain = is_usual && matches!(&self.routes[..], [only] if only.is_plain());
     }
 }
 
@@ -195,6 +200,14 @@ impl<T: Message> OutputEnd for OutputCore<T> {
             room[..len].copy_from_slice(&row[..len]);
             len
         });
+    }
+
+    fn hold(&self) {
+        self.keep_back();
+    }
+
+    fn release(&self) {
+        self.send_held();
     }
 
     fn facing(&self) -> Arc<dyn InputEnd> {
@@ -407,6 +420,9 @@ impl<T: Message> OutputCore<T> {
         context: Option<&Context>,
     ) -> Sent {
         let inner = self.inner();
+        if inner.held.is_some() {
+            return self.hold_back(inner, header, fill);
+        }
         if inner.faulty.is_some() {
             return self.send_faulty(inner, header, fill, context);
         }
@@ -571,6 +587,7 @@ pub(crate) fn output_core<T: Message>(options: &PortOptions, seats: usize) -> Ar
             routes: Vec::new(),
             memory,
             faulty: None,
+            held: None,
             is_plain: false,
         }),
         shared,

@@ -5,6 +5,7 @@
 mod asking;
 #[cfg(rtsan)]
 mod blocking;
+mod busy;
 mod calls;
 mod cuts;
 mod deaths;

@@ -49,14 +49,17 @@ impl<T: Message> OutputCore<T> {
 }
 
 /// The routes that lead to others than the one who was chosen, closed until this goes: also when what fills the message panics.
-struct Closed<'a, T: Message>(&'a OutputCore<T>);
+pub(super) struct Closed<'a, T: Message>(&'a OutputCore<T>);
 
 impl<'a, T: Message> Closed<'a, T> {
-    fn all_but(agent: AgentId, core: &'a OutputCore<T>) -> Closed<'a, T> {
+    pub(super) fn all_but(agent: AgentId, core: &'a OutputCore<T>) -> Closed<'a, T> {
         let inner = core.inner();
         inner.routes.iter_mut().for_each(|route| route.close(route.target.agent != agent));
         // Filters are asked.
         inner.is_plain = false;
+        if let Some(held) = &mut inner.held {
+            held.chosen = Some(agent);
+        }
         Closed(core)
     }
 }
@@ -65,6 +68,9 @@ impl<T: Message> Drop for Closed<'_, T> {
     fn drop(&mut self) {
         let inner = self.0.inner();
         inner.routes.iter_mut().for_each(|route| route.close(false));
+        if let Some(held) = &mut inner.held {
+            held.chosen = None;
+        }
         inner.changed();
     }
 }
