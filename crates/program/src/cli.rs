@@ -64,6 +64,9 @@ pub(crate) struct RunArgs {
     /// In simulated time, lets each step take the cost that the file declares, on so many virtual processors; else steps take no time.
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u8).range(1..=64))]
     pub(crate) processors: Option<u8>,
+    /// Begins also where the analysis says that deadlines will be missed; the summary tells.
+    #[arg(long)]
+    pub(crate) force: bool,
     /// How long at most, as in 300s; else as long as the goal gives.
     #[arg(long = "for", value_name = "TIME", value_parser = duration)]
     pub(crate) limit: Option<Duration>,

@@ -58,7 +58,7 @@ pub(crate) enum LiveCommand {
     Wire(Words),
     /// Cuts a wire, when what is on it has arrived.
     Unwire(Words),
-    /// Sets parameters, or period, deadline, min_gap: sinew set NAME KEY=VALUE…
+    /// Sets parameters, or period, deadline, min_gap, cost: sinew set NAME KEY=VALUE…
     Set(Words),
     /// The emergency stop: all robots stand until "sinew reset".
     Stop(Words),
@@ -94,11 +94,18 @@ pub(crate) struct Words {
     /// Names and KEY=VALUE.
     #[arg(value_name = "WORDS", allow_hyphen_values = false)]
     words: Vec<String>,
+    /// Of add, set and wire: does it also where deadlines would be missed by it. The summary tells.
+    #[arg(long)]
+    force: bool,
     #[command(flatten)]
     which: Which,
 }
 
 impl LiveCommand {
+    fn is_forced(&self) -> bool {
+        matches!(self, LiveCommand::Add(said) | LiveCommand::Set(said) | LiveCommand::Wire(said) if said.force)
+    }
+
     /// The words of a command that is only that, and which system it is for.
     fn plain(&self) -> Option<(&'static str, &[String], &Which)> {
         Some(match self {
@@ -123,7 +130,7 @@ impl LiveCommand {
 /// Does a command.
 pub(crate) fn live(command: LiveCommand, json: bool) -> Result<ExitCode, Failure> {
     if let Some((verb, words, which)) = command.plain() {
-        return said(verb, words, which, json);
+        return said(verb, words, which, command.is_forced(), json);
     }
     match command {
         LiveCommand::Ls(which) => show(&which, "ls", shown::ls, json),
@@ -159,8 +166,9 @@ fn failure(error: ClientError) -> Failure {
 const LONGEST_CALL_WAITS: HostDuration = HostDuration::from_nanos(control::protocol::LONGEST_CALL.0 as u64)
     .saturating_add(HostDuration::from_secs(5));
 
-fn said(verb: &str, words: &[String], which: &Which, json: bool) -> Result<ExitCode, Failure> {
-    let all: Vec<String> = std::iter::once(verb.to_owned()).chain(words.iter().cloned()).collect();
+fn said(verb: &str, words: &[String], which: &Which, forced: bool, json: bool) -> Result<ExitCode, Failure> {
+    let first = forced.then_some("force").into_iter().chain([verb]).map(str::to_owned);
+    let all: Vec<String> = first.chain(words.iter().cloned()).collect();
     if control::words::CHANGES.iter().any(|usage| usage.verb == verb) && verb != "send" {
         // What is wrong in the words alone is told without a system.
         control::words::parse(&all)?;

@@ -115,6 +115,7 @@ pub use folder::{FolderError, RunFolder};
 pub use log::{LogChoice, Noted, Recorder, write_note};
 pub use memory::Found;
 pub use message_type::{LARGEST_BY_VALUE, MessageType};
+pub use os::processor_time;
 pub use plan::{
     AgentPlan, ExecutorPlan, OnDeath, Plan, TimedRequest, USUAL_DEPTH, USUAL_DEPTH_ON, Wirable, WireFilter,
     WirePlan, owner, value_of,
@@ -130,7 +131,7 @@ pub use request::{
     Request, SystemView, WireTotals, WireView,
 };
 pub use ring::{MOST_MESSAGES, Overload};
-pub use router::{Incident, ServiceShape, robot_wires};
+pub use router::{Admission, Incident, ServiceShape, robot_wires};
 pub use service::{CALLS_UNDER_WAY, Call, Client, Reply, Service, Ticket};
 pub use simulated::Simulation;
 pub use stats::{AgentStats, Figure, Histogram};

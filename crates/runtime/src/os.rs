@@ -121,6 +121,11 @@ pub(crate) fn thread_time() -> u64 {
     clock(libc::CLOCK_THREAD_CPUTIME_ID) as u64
 }
 
+/// How long the calling thread has had a processor, in all. A system call: not for every step.
+pub fn processor_time() -> types::Duration {
+    types::Duration(thread_time() as i64)
+}
+
 /// The number of the user in whose name the process acts.
 pub(crate) fn user() -> u32 {
     // SAFETY: the call has no arguments and cannot fail.

@@ -42,7 +42,7 @@ pub enum Request {
         /// The input.
         to: String,
     },
-    /// Sets a parameter, or `period`, `deadline`, `min_gap`.
+    /// Sets a parameter, or `period`, `deadline`, `min_gap`, `cost`.
     Set {
         /// Whose.
         agent: String,
@@ -79,6 +79,8 @@ pub enum Request {
     Quit,
     /// Several, done together or not at all.
     All(Vec<Request>),
+    /// One that is done also where deadlines are missed by it.
+    Forced(Box<Request>),
 }
 
 impl Request {
@@ -87,6 +89,7 @@ impl Request {
         match self {
             Request::Fault { target, fault } => vec![format!("fault {target} {}", fault.name())],
             Request::All(requests) => requests.iter().flat_map(Request::faults).collect(),
+            Request::Forced(request) => request.faults(),
             _ => Vec::new(),
         }
     }

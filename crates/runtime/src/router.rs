@@ -8,6 +8,7 @@
 //! The order is fixed: the receiver joins before the sender adds; the sender forgets before the receiver leaves, and a receiver that is
 //! not drained yet is asked again.
 
+mod admission;
 mod agents;
 mod asking;
 mod calls;
@@ -40,6 +41,7 @@ use crate::ring::Overload;
 use crate::stats::AgentStats;
 use crate::tap::Tap;
 
+pub use admission::Admission;
 pub(crate) use asking::Said;
 pub(crate) use calls::OutsideCall;
 pub use calls::ServiceShape;
@@ -225,6 +227,10 @@ pub(crate) struct Router {
     past: WireTotals,
     /// The time of the request that is being done, or of the last look.
     now: Time,
+    /// What admission counts with; nothing where everything is admitted.
+    admission: Option<Admission>,
+    /// Whether steps are measured: in simulated time what the host took for them says nothing, and would not be the same again.
+    pub measures: bool,
     log: LogChoice,
     pub log_shared: Arc<LogShared>,
     robots: Vec<String>,
@@ -261,6 +267,8 @@ impl Router {
             leaving: Vec::new(),
             past: WireTotals::default(),
             now: Time::ZERO,
+            admission: None,
+            measures: false,
             log: LogChoice::default(),
             log_shared: LogShared::new(),
             robots,

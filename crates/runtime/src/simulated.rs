@@ -46,7 +46,7 @@ impl Simulation {
     /// Builds what a plan describes.
     pub fn new(plan: &Plan, registry: &Registry, options: Options) -> Result<Simulation, CannotRun> {
         install_panic_hook();
-        let built = build(plan, registry, options.log.clone(), Time::ZERO)?;
+        let built = build(plan, registry, &options, Time::ZERO)?;
         let (control, asks) = asks();
         let mut timed = Vec::new();
         for request in &plan.requests {

@@ -192,6 +192,14 @@ impl AgentStats {
         figure(&[&self.exec, &self.undisturbed])
     }
 
+    /// How many steps were timed, and how long the longest of them used its processor.
+    pub(crate) fn longest(&self) -> (u64, Duration) {
+        let parts = [&self.exec, &self.undisturbed];
+        let longest = parts.iter().map(|part| part.max.load(Relaxed)).max().unwrap_or(0);
+        let steps = parts.iter().map(|part| part.n.load(Relaxed)).sum();
+        (steps, Duration(i64::try_from(longest).unwrap_or(i64::MAX)))
+    }
+
     /// Has fetched what a step that is due adds to, but for the step of its histogram.
     #[inline]
     pub(crate) fn fetch(&self) {

@@ -14,7 +14,7 @@ use crate::names::Directory;
 use crate::plan::Plan;
 use crate::queue_plan::PlanParts;
 use crate::request::{Refusal, Request, SystemView};
-use crate::router::{ExecutorKnown, Fabric, Incident, OutsideCall, Router, ServiceShape, Staged};
+use crate::router::{Admission, ExecutorKnown, Fabric, Incident, OutsideCall, Router, ServiceShape, Staged};
 use crate::tap::Tap;
 
 /// What somebody wants of a running system, on the way to it.
@@ -131,6 +131,8 @@ pub struct Options {
     pub log: LogChoice,
     /// Who watches.
     pub observer: Box<dyn Observer>,
+    /// What admission counts with; everything is admitted when nothing is said.
+    pub admission: Option<Admission>,
     /// In simulated time: on how many virtual processors steps take the costs that the plan declares; none takes any time when nothing
     /// is said.
     pub processors: Option<usize>,
@@ -146,6 +148,7 @@ impl Default for Options {
             recorder: None,
             log: LogChoice::default(),
             observer: Box::new(NoObserver),
+            admission: None,
             processors: None,
             parse: |words| Err(Refusal::new(format!("\"{}\" cannot be asked here", words.join(" ")))),
         }
@@ -228,7 +231,12 @@ impl Fabric for Still<'_> {
 }
 
 /// Builds what a plan describes.
-pub(crate) fn build(plan: &Plan, registry: &Registry, log: LogChoice, now: Time) -> Result<Built, CannotRun> {
+pub(crate) fn build(
+    plan: &Plan,
+    registry: &Registry,
+    options: &Options,
+    now: Time,
+) -> Result<Built, CannotRun> {
     let mistakes = crate::check::check(plan, registry);
     if !mistakes.is_empty() {
         return Err(CannotRun::Mistakes(mistakes));
@@ -244,7 +252,8 @@ pub(crate) fn build(plan: &Plan, registry: &Registry, log: LogChoice, now: Time)
         plan.section("robot").map(|robots| robots.rows().iter().map(|row| row.key.clone()).collect());
     let mut router =
         Router::new(&plan.name, registry.clone(), executors, robots.unwrap_or_default(), directory.clone());
-    router.set_log(log);
+    router.set_log(options.log.clone());
+    router.set_admission(options.admission.clone());
     let context = crate::context::Context::new(None, directory.clone());
     let wires = wires_of(plan, registry);
     let mut fabric = Still { cores: &mut cores, context: &context, now };
@@ -268,6 +277,7 @@ pub(crate) fn build(plan: &Plan, registry: &Registry, log: LogChoice, now: Time)
     for wire in &wires {
         router.wire(wire, &mut staged).map_err(CannotRun::Refused)?;
     }
+    router.admit_all().map_err(CannotRun::Refused)?;
     router.settle(staged, &mut fabric);
     Ok(Built { router, cores, directory })
 }

@@ -17,6 +17,8 @@ use crate::router::{timing_of, usual_executor};
 pub struct Assumed<'a> {
     /// Processor time of a step of an agent at worst.
     pub cost: &'a dyn Fn(&AgentPlan) -> Duration,
+    /// How many processors there are.
+    pub processors: usize,
     /// What the runtime needs around each step: waking, choosing, counting.
     pub overhead: Duration,
     /// The time between two messages of an output that sends by a clock of its own, whatever makes its agent run: a robot's readings.
@@ -64,7 +66,9 @@ pub fn timetable(plan: &Plan, registry: &Registry, assumed: &Assumed<'_>) -> Tim
             least_gap: exact(agent.min_gap),
         }
     });
-    Timetable { system: System { agents: agents.collect(), executors: threads.collect() }, executors }
+    let system =
+        System { processors: assumed.processors, agents: agents.collect(), executors: threads.collect() };
+    Timetable { system, executors }
 }
 
 fn exact(span: Duration) -> Exact {

@@ -117,7 +117,8 @@ impl Live {
     pub fn new(plan: &Plan, registry: &Registry, options: Options) -> Result<Live, CannotRun> {
         install_panic_hook();
         let clock = WallClock::start();
-        let built = build(plan, registry, options.log.clone(), clock.now())?;
+        let mut built = build(plan, registry, &options, clock.now())?;
+        built.router.measures = true;
         let (control, asks) = asks();
         let mut timed = Vec::new();
         for request in &plan.requests {

@@ -7,7 +7,8 @@
 //!
 //! The bounds are those of holistic analysis (Tindell and Clark 1994): responses and the lateness that they cause are reckoned in turns until
 //! nothing changes. They hold for executors that may run on several processors, too: as long as one waits, one of its processors is at work for
-//! those who go before it, as on a single one.
+//! those who go before it, as on a single one; and all of its processors are, which gives another bound (Bertogna and Cirinei 2007). The lower of
+//! both counts.
 
 use num_traits::Zero;
 
@@ -81,6 +82,8 @@ pub struct Agent {
 /// Agents and the threads that run them.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct System {
+    /// How many processors there are; none is one.
+    pub processors: usize,
     /// The threads.
     pub executors: Vec<Executor>,
     /// The agents.
@@ -120,6 +123,8 @@ pub enum Unsound {
     TooFine,
 }
 
+/// Responses on several processors are told to a deadline's 2^-12.
+const GRAIN: u32 = 12;
 /// More rounds than most sets need.
 const ROUNDS: usize = 100;
 /// A response of so many times the longest period is as good as none.
@@ -281,14 +286,16 @@ impl Whole<'_> {
         let mut responses: Responses = vec![Some(0); self.agents.len()];
         for _ in 0..ROUNDS {
             let streams = self.streams(&responses);
-            let next: Responses = (0..self.agents.len()).map(|at| self.response(&streams, at)).collect();
+            let next: Responses =
+                (0..self.agents.len()).map(|at| self.response(&streams, &responses, at)).collect();
             if next == responses || is_enough(&next) {
                 return (streams, next);
             }
             responses = next;
         }
-        let streams = self.streams(&vec![None; self.agents.len()]);
-        let responses = (0..self.agents.len()).map(|at| self.response(&streams, at)).collect();
+        let open = vec![None; self.agents.len()];
+        let streams = self.streams(&open);
+        let responses = (0..self.agents.len()).map(|at| self.response(&streams, &open, at)).collect();
         (streams, responses)
     }
 
@@ -334,10 +341,62 @@ impl Whole<'_> {
     }
 
     /// From what made an agent run to the end of its step at worst.
-    fn response(&self, streams: &[Vec<Flow>], at: usize) -> Option<i128> {
+    fn response(&self, streams: &Streams, before: &Responses, at: usize) -> Option<i128> {
         if !self.system.is_in_real_time(at) {
             return None;
         }
+        let as_on_one = self.response_on_one(streams, at);
+        let may = self.system.executors[self.system.agents[at].executor].may;
+        let count = self.system.processors.clamp(1, 64);
+        match (may & Mask::MAX >> (64 - count)).count_ones() {
+            0 | 1 => as_on_one,
+            several => {
+                let on_several = self.response_on_several(streams, before, at, several.into());
+                as_on_one.into_iter().chain(on_several).min()
+            }
+        }
+    }
+
+    /// As long as its executor waits for a processor, all of them are at work for those who go before it. How much work of others falls into a
+    /// time says how late they are themselves.
+    fn response_on_several(
+        &self,
+        streams: &Streams,
+        before: &Responses,
+        at: usize,
+        processors: i128,
+    ) -> Option<i128> {
+        let own = self.system.agents[at].executor;
+        let numbers = &self.agents[at];
+        let (mut beside, mut above) = (Vec::new(), Vec::new());
+        for (other, agent) in self.system.agents.iter().enumerate() {
+            if !self.goes_before(agent.executor, own) || (other == at && streams[at].len() < 2) {
+                continue;
+            }
+            let late = if other == at { Some(numbers.deadline) } else { before[other] }?;
+            let work =
+                streams[other].iter().map(|flow| Carried { row: flow.row, late: flow.row.jitter + late });
+            if agent.executor == own { beside.extend(work) } else { above.extend(work) }
+        }
+        // One step at a time: the one before must be over when the next message comes.
+        let room = streams[at].iter().map(|flow| flow.row.period - flow.row.jitter).min()?;
+        let limit = room.min(numbers.deadline);
+        let sum = |work: &[Carried], ready: i128| work.iter().map(|work| work.within(ready)).sum::<i128>();
+        // Where all that falls into a time fits into it, that time is long enough. It grows in steps, not by ticks.
+        let step = (numbers.deadline >> GRAIN).max(1);
+        let mut ready = numbers.cost.max(1);
+        while ready <= limit {
+            let all = numbers.cost + sum(&beside, ready) + sum(&above, ready) / processors;
+            if all <= ready {
+                return Some(ready);
+            }
+            ready = (all + step - 1) / step * step;
+        }
+        None
+    }
+
+    /// The same as if all processors were one.
+    fn response_on_one(&self, streams: &[Vec<Flow>], at: usize) -> Option<i128> {
         let longest = streams.iter().flatten().map(|flow| flow.row.period).max().unwrap_or(1);
         let limit = longest.max(self.agents[at].deadline).saturating_mul(LONG);
         let own = self.system.agents[at].executor;
@@ -387,6 +446,23 @@ impl Whole<'_> {
                 meets: response.is_some_and(|response| response <= numbers.deadline),
             })
             .collect()
+    }
+}
+
+/// The work of a stream that is late itself.
+struct Carried {
+    row: Row,
+    /// How long after its arrival a job may end.
+    late: i128,
+}
+
+impl Carried {
+    /// How much of it falls into a time of this length at most: when the first job ends as late as it may, and all others as soon as they may.
+    fn within(&self, length: i128) -> i128 {
+        let Row { cost, period, .. } = self.row;
+        let time = length + self.late - cost;
+        let whole = time.max(0) / period;
+        whole * cost + (time - whole * period).clamp(0, cost)
     }
 }
 

@@ -38,7 +38,7 @@ const fn usage(verb: &'static str, form: &'static str, does: &'static str) -> Us
 }
 
 /// The requests that change a running system: what [`parse`] reads.
-pub const CHANGES: [Usage; 12] = [
+pub const CHANGES: [Usage; 13] = [
     usage("add", "add NAME is KIND [robot=…] [period=…] [on=…] [KEY=VALUE…]", "adds an agent"),
     usage("add", "add NAME is queue [depth=N] [overload=…]", "adds a queue"),
     usage("remove", "remove NAME", "removes an agent and its wires; or a queue that nobody needs"),
@@ -50,10 +50,11 @@ pub const CHANGES: [Usage; 12] = [
         "makes a wire",
     ),
     usage("unwire", "unwire FROM TO", "cuts a wire, when what is on it has arrived"),
-    usage("set", "set NAME KEY=VALUE…", "sets parameters, or the period, deadline or min_gap"),
+    usage("set", "set NAME KEY=VALUE…", "sets parameters, or the period, deadline, min_gap or cost"),
     usage("fault", "fault AGENT|OUTPUT KIND", "makes an agent or an output misbehave; \"ok\" ends it"),
     usage("send", "send PORT cdr=HEX", "sends a message out of a port"),
     usage("call", "call SERVICE cdr=HEX [within=2s]", "calls a service, and does not wait for the answer"),
+    usage("force", "force add|set|wire …", "does it also where deadlines are missed by it"),
     usage("quit", "quit", "ends the run"),
 ];
 

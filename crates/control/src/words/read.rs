@@ -52,6 +52,7 @@ fn read_one(words: &[String]) -> Read<Request> {
     match verb.as_str() {
         "add" if rest.get(2).is_some_and(|kind| kind == QUEUE) => read_queue(rest).map(Request::Queue),
         "add" => read_add(rest).map(Request::Add),
+        "force" => read_one(rest).map(|request| Request::Forced(Box::new(request))),
         "remove" => only(verb, rest).map(|[agent]| Request::Remove(agent)),
         "restart" => only(verb, rest).map(|[agent]| Request::Restart(agent)),
         "replace" => {

@@ -211,6 +211,11 @@ prop_compose! {
 }
 
 fn single() -> impl Strategy<Value = Request> {
+    (plain(), any::<bool>())
+        .prop_map(|(request, forced)| if forced { Request::Forced(Box::new(request)) } else { request })
+}
+
+fn plain() -> impl Strategy<Value = Request> {
     prop_oneof![
         agent().prop_map(Request::Add),
         a_queue().prop_map(Request::Queue),

@@ -29,12 +29,20 @@ pub fn words_of(request: &Request) -> Vec<String> {
         Request::Call { service, cdr, within } => {
             words(["call", service, &digits(cdr), &format!("within={within}")])
         }
+        Request::Forced(request) => {
+            let several: Vec<Vec<String>> = words_of(request).split(|word| word == AND).map(forced).collect();
+            several.join(&AND.to_owned())
+        }
         Request::Quit => words(["quit"]),
         Request::All(requests) => {
             let several: Vec<Vec<String>> = requests.iter().map(words_of).collect();
             several.join(&AND.to_owned())
         }
     }
+}
+
+fn forced(words: &[String]) -> Vec<String> {
+    std::iter::once("force".to_owned()).chain(words.iter().cloned()).collect()
 }
 
 fn digits(cdr: &[u8]) -> String {

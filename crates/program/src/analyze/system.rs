@@ -3,7 +3,6 @@
 use std::collections::BTreeMap;
 use std::path::Path;
 
-use hardware::robot::CYCLE;
 use runtime::{
     AgentPlan, Assumed, CannotRun, Options, Registry, Simulation, Timetable, owner, timetable, wires_of,
 };
@@ -36,7 +35,7 @@ pub(super) fn analyse(name: &str, args: &AnalyzeArgs, registry: &Registry) -> Re
     let measured = args.from.as_deref().map(Measured::read).transpose()?;
     let sources = file.sources.clone();
     let ready = Scenario { file, registry }.prepare(1)?;
-    let mut report = report(&ready, measured)?;
+    let mut report = report(&ready, measured, args.processors.into())?;
     if let Some(limit) = args.play {
         let played = play(ready, &mut report, limit, args.processors.into());
         played.map_err(|error| failure(error, &sources))?;
@@ -68,7 +67,7 @@ fn play(mut ready: Ready, report: &mut Report, limit: Duration, processors: usiz
     Ok(())
 }
 
-fn report(ready: &Ready, measured: Option<Measured>) -> Result<Report, Failure> {
+fn report(ready: &Ready, measured: Option<Measured>, processors: usize) -> Result<Report, Failure> {
     let plan = &ready.plan;
     let is_simulated = |agent: &AgentPlan| {
         ready.robots.iter().any(|robot| robot.name == agent.name && robot.description.driver == "sim")
@@ -79,9 +78,12 @@ fn report(ready: &Ready, measured: Option<Measured>) -> Result<Report, Failure> 
         if is_simulated(agent) { agent.cost.or(Some(Duration::ZERO)) } else { measured.or(agent.cost) }
     };
     let cost = |agent: &AgentPlan| known(agent).unwrap_or(Duration::ZERO);
-    let pace = |port: &str| pace(ready, port);
-    let table =
-        timetable(plan, &ready.registry, &Assumed { cost: &cost, overhead: Duration::ZERO, pace: &pace });
+    let pace = |port: &str| ready.pace(port);
+    let table = timetable(
+        plan,
+        &ready.registry,
+        &Assumed { cost: &cost, processors, overhead: Duration::ZERO, pace: &pace },
+    );
     let found = table.system.analyse().map_err(|unsound| unsound_failure(&unsound, ready))?;
     let mut report = Report { name: plan.name.clone(), ..Report::default() };
     report.rows = rows(ready, &table, &found);
@@ -117,25 +119,6 @@ fn report(ready: &Ready, measured: Option<Measured>) -> Result<Report, Failure> 
         }
     }
     Ok(report)
-}
-
-/// The time between two readings of a robot; what was recorded comes no more often than its gate looks.
-fn pace(ready: &Ready, port: &str) -> Option<Duration> {
-    let (robot, port) = port.rsplit_once('.')?;
-    let periods = ready.robots.iter().find(|known| known.name == robot)?.description.periods;
-    let known = match port {
-        "sonar" => periods.sonar,
-        "scan" => periods.scan,
-        "image" => periods.image,
-        "ticks" => periods.ticks,
-        "bumper" => periods.bumper,
-        "gyro" => periods.gyro,
-        "battery" => periods.battery,
-        "head" => periods.head,
-        "pose" => periods.pose,
-        _ => None,
-    };
-    Some(known.filter(|period| *period > Duration::ZERO).unwrap_or(CYCLE))
 }
 
 fn unsound_failure(unsound: &Unsound, ready: &Ready) -> Failure {
@@ -253,7 +236,10 @@ fn parts(table: &Timetable, found: &[Found]) -> Vec<Part> {
         let name = if several {
             format!("processor {}", cpus.join(", "))
         } else {
-            "all processors as one".to_owned()
+            match system.processors {
+                0 | 1 => "one processor".to_owned(),
+                several => format!("{several} processors"),
+            }
         };
         let meets = members.iter().all(|at| found[*at].meets);
         let mut part = Part { response_time: meets, ..set::part_of(name, &set) };
@@ -395,7 +381,7 @@ mod tests {
     fn read(text: &str, measured: Option<Measured>) -> Result<Report, Failure> {
         let registry = with_robots(registry![Relay]);
         let file = file::read(text, "t.toml", None, &[], &registry).map_err(Failure::from)?;
-        report(&Scenario { file, registry }.prepare(1).unwrap(), measured)
+        report(&Scenario { file, registry }.prepare(1).unwrap(), measured, 1)
     }
 
     const THREE: &str = r#"
@@ -470,7 +456,7 @@ executor = "low"
             let file = file::load(name, &[], &registry).unwrap();
             let scenario = Scenario { file, registry };
             let ready = scenario.prepare(1).unwrap();
-            let mut told = report(&ready, None).unwrap();
+            let mut told = report(&ready, None, processors).unwrap();
             assert!(told.pass(), "{name}");
             play(ready, &mut told, Duration::millis(millis), processors).unwrap();
             for row in &told.rows {

@@ -10,7 +10,7 @@ use std::path::{Path, PathBuf};
 use serde_json::{Value as Json, json};
 
 mod machine;
-mod probe;
+pub(crate) mod probe;
 
 pub use machine::Machine;
 
@@ -61,7 +61,25 @@ pub struct Examination {
 
 /// Examines this machine. For a moment it starts a real-time thread, to see whether it may.
 pub fn examine() -> Examination {
-    Examination::of(&Machine::read(Path::new("/")), &probe::granted(), &run_folder())
+    let mut examination = Examination::of(&Machine::read(Path::new("/")), &probe::granted(), &run_folder());
+    examination.lines.push(around_a_step(probe::overhead()));
+    examination
+}
+
+/// What the runtime needs of a processor besides the steps.
+fn around_a_step(found: Option<probe::Overhead>) -> Line {
+    let micros = |span: types::Duration| format!("{:.1} µs", span.seconds() * 1e6);
+    let found = found.map(|found| {
+        format!(
+            "{} of processor time, 99 of 100 within {}: the first is what admission counts",
+            micros(found.median),
+            micros(found.most)
+        )
+    });
+    match found {
+        Some(found) => line("around a step", State::Good, found, ""),
+        None => line("around a step", State::Unseen, "could not be measured", ""),
+    }
 }
 
 /// Where running systems leave what others may find.

@@ -28,6 +28,7 @@ use runtime::{CannotRun, Control, Live, Options, Plan, Recorder, Registry, Repor
 use types::Duration;
 
 use crate::cli::{ClockChoice, RunArgs, Speed};
+use crate::doctor::probe;
 use crate::error::Failure;
 use crate::signals::Signals;
 use crate::{figures, file, terminal};
@@ -170,6 +171,7 @@ impl One<'_> {
             },
             recorder,
             observer: Box::new(judge),
+            admission: Some(ready.admission(self.processors(), self.overhead(), self.args.force)),
             processors: self.args.processors.map(usize::from),
             parse: control::words::parse,
         };
@@ -182,6 +184,20 @@ impl One<'_> {
         summary.repeat = self.repeat.as_ref().map(|repeat| self.compared(repeat, &ready));
         self.write_files(&mut summary);
         Ok(summary)
+    }
+
+    /// How many processors admission counts with: those that are played, or those of the machine.
+    fn processors(&self) -> usize {
+        let there = || std::thread::available_parallelism().map_or(1, usize::from);
+        self.args.processors.map_or_else(there, usize::from)
+    }
+
+    /// What the runtime needs around a step: in simulated time nothing.
+    fn overhead(&self) -> Duration {
+        match self.clock {
+            ClockChoice::Sim => Duration::ZERO,
+            ClockChoice::Wall => probe::overhead().unwrap_or_default().median,
+        }
     }
 
     /// What became of a repeated run.

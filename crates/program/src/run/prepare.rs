@@ -1,14 +1,16 @@
 //! From a plan to one that a seed has drawn, with its robots behind their gates.
 
-use std::collections::BTreeSet;
+use std::collections::{BTreeSet, HashMap};
 use std::sync::{Arc, Mutex, PoisonError};
 
+use hardware::description::Periods;
 use hardware::gate::Counts;
-use hardware::robot::RobotParams;
+use hardware::robot::{CYCLE, RobotParams};
 use hardware::simulated::{self, Truth};
 use hardware::{Berth, ClockKind, Gate, Latch, RobotDescription, Spec};
-use runtime::{Params as _, Plan, Registry};
+use runtime::{Admission, Params as _, Plan, Registry};
 use sim::{Drawn, Goal, Model, Vary, WorldPlan};
+use types::Duration;
 use types::value::{Mistake, Row, Span, Table};
 
 use crate::error::Failure;
@@ -186,7 +188,44 @@ fn gate_keys() -> impl Iterator<Item = &'static str> {
     RobotParams::fields().into_iter().map(|field| field.name)
 }
 
+/// How often a reading comes, if it does.
+type Every = fn(&Periods) -> Option<Duration>;
+
+/// The readings of a robot that come by a clock of its own.
+const READINGS: [(&str, Every); 9] = [
+    ("sonar", |periods| periods.sonar),
+    ("scan", |periods| periods.scan),
+    ("image", |periods| periods.image),
+    ("ticks", |periods| periods.ticks),
+    ("bumper", |periods| periods.bumper),
+    ("gyro", |periods| periods.gyro),
+    ("battery", |periods| periods.battery),
+    ("head", |periods| periods.head),
+    ("pose", |periods| periods.pose),
+];
+
 impl Ready {
+    /// The time between two readings at a port of a robot. What was recorded comes no more often than its gate looks.
+    pub(crate) fn pace(&self, port: &str) -> Option<Duration> {
+        let (robot, port) = port.rsplit_once('.')?;
+        let periods = self.robots.iter().find(|known| known.name == robot)?.description.periods;
+        let reading = READINGS.iter().find(|(name, _)| *name == port);
+        let known = reading.and_then(|(_, of)| of(&periods)).filter(|period| *period > Duration::ZERO);
+        Some(known.unwrap_or(CYCLE))
+    }
+
+    /// What admission counts with, when the runtime needs so much around each step.
+    pub(crate) fn admission(&self, processors: usize, overhead: Duration, force: bool) -> Admission {
+        let mut pace = HashMap::new();
+        for robot in &self.robots {
+            for (port, _) in READINGS {
+                let port = format!("{}.{port}", robot.name);
+                pace.extend(self.pace(&port).map(|every| (port, every)));
+            }
+        }
+        Admission { processors, overhead, pace, force }
+    }
+
     /// Puts a gate behind the agent of its robot. Each gate is a type of agent of its own.
     fn enter(&mut self, row: &Row, gate: Gate, radius: f64, report: Option<hardware::Report>) {
         self.robots.push(RobotReady {

@@ -279,7 +279,7 @@ impl Router {
         staged: &mut Staged,
     ) -> Reply<()> {
         let id = self.id_of(name)?;
-        if matches!(key, "period" | "deadline" | "min_gap") {
+        if matches!(key, "period" | "deadline" | "min_gap" | "cost") {
             return self.set_timing(id, key, &value, staged);
         }
         let known = &self.agents[&id];
@@ -314,6 +314,7 @@ impl Router {
         match key {
             "period" => plan.period = Some(span),
             "deadline" => plan.deadline = Some(span),
+            "cost" => plan.cost = Some(span),
             _ => plan.min_gap = span,
         }
         if let (Some(period), Some((least, most))) = (plan.period, plan.period_range)

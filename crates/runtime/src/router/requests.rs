@@ -2,6 +2,7 @@
 
 use types::Time;
 
+use super::admission::changes_timing;
 use super::{Fabric, OutsideCall, Reply, Router, Staged, timing_of};
 use crate::plan::WirePlan;
 use crate::request::{Refusal, Request};
@@ -19,7 +20,11 @@ impl Router {
         concerned.dedup();
         self.ask_all(&concerned, fabric)?;
         let mut staged = Staged::default();
-        match self.stage(request, &mut staged) {
+        let done = match request {
+            Request::Forced(request) => self.stage(*request, &mut staged).map(|()| self.note_forced()),
+            request => self.stage_admitted(request, &mut staged),
+        };
+        match done {
             Ok(()) => {
                 let script = self.decide(staged);
                 self.finish(script, fabric);
@@ -59,8 +64,20 @@ impl Router {
             | Request::Fault { target, .. }
             | Request::Send { port: target, .. } => executors.extend(of(target)),
             Request::All(requests) => requests.iter().for_each(|request| self.concerned(request, executors)),
+            Request::Forced(request) => self.concerned(request, executors),
             Request::Queue(_) | Request::Call { .. } | Request::Quit => {}
         }
+    }
+
+    /// The same as [`stage`](Self::stage), and refuses it where deadlines would be missed by it that are met now.
+    fn stage_admitted(&mut self, request: Request, staged: &mut Staged) -> Reply<()> {
+        let Some(name) = changes_timing(&request).map(str::to_owned) else {
+            return self.stage(request, staged);
+        };
+        // What cannot be analysed as it is is no reason to refuse something else.
+        let before = self.judged().ok().flatten();
+        self.stage(request, staged)?;
+        self.admit(before.as_ref(), Some(&name))
     }
 
     /// Checks a request and writes it into the registry. When it is refused, what was written is to be taken back.
@@ -81,6 +98,7 @@ impl Router {
                     .help("ask for it alone"))
             }
             Request::Quit => Ok(()),
+            Request::Forced(request) => self.stage(*request, staged),
             Request::All(requests) => {
                 requests.into_iter().try_for_each(|request| self.stage(request, staged))
             }

@@ -20,7 +20,7 @@ use crate::port::{Input, Output, Port, PortEnds};
 use crate::request::{AgentState, FaultKind, Refusal, Request};
 use crate::service::{Client, Service};
 use crate::system::{Still, build};
-use crate::{LogChoice, Params, registry};
+use crate::{Options, Params, registry};
 
 /// Has an end of each kind.
 #[derive(Agent)]
@@ -106,7 +106,7 @@ impl World {
         plan.wires = [("a.go", "b.come"), ("b.go", "c.come"), ("a.kept", "c.come"), ("b.ask", "c.answer")]
             .map(|(from, to)| WirePlan::new(from, to))
             .into();
-        let built = build(&plan, &registry![Both], LogChoice::default(), Time::ZERO).unwrap();
+        let built = build(&plan, &registry![Both], &Options::default(), Time::ZERO).unwrap();
         let context = Context::new(None, built.directory);
         World { router: built.router, cores: built.cores, context, now: Time::ZERO }
     }

@@ -176,7 +176,7 @@ proptest! {
     fn no_step_takes_longer_than_analysed(drawn in drawn()) {
         let Drawn { plan, processors } = drawn;
         let cost = |agent: &AgentPlan| agent.cost.unwrap_or_default();
-        let assumed = Assumed { cost: &cost, overhead: Duration::ZERO, pace: &|_| None };
+        let assumed = Assumed { cost: &cost, overhead: Duration::ZERO, processors, pace: &|_| None };
         let table = timetable(&plan, &registry![Stamp], &assumed);
         let found = table.system.analyse().unwrap();
         let report = played(&plan, processors, 4000);

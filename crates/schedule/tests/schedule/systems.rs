@@ -37,7 +37,8 @@ fn each_on_a_thread_of_its_own_is_as_in_the_papers() {
             sources: vec![Source::Clock { period: task.period }],
             least_gap: n(0),
         });
-        let system = System { agents: agents.collect(), executors: executors(set.len() as u8) };
+        let system =
+            System { processors: 1, agents: agents.collect(), executors: executors(set.len() as u8) };
         let expected: Vec<_> = response::responses(&set).iter().map(|it| Some(it.at_worst)).collect();
         assert_eq!(responses(&system), expected);
         assert!(system.is_feasible().unwrap());
@@ -50,7 +51,7 @@ fn those_of_one_thread_wait_for_each_other() {
     // next one, and for one above in each 5: 2 + 5 + 5 = 12, and 3 above make 15. The second: 5 + 2 + 2 of 10 + 1 of 5 is at 14 what it
     // was: 7 + 2 * 2 + 3.
     let agents = vec![agent(1, 5, 0, clock(5)), agent(2, 10, 1, clock(10)), agent(5, 50, 1, clock(50))];
-    let system = System { agents, executors: executors(2) };
+    let system = System { processors: 1, agents, executors: executors(2) };
     assert_eq!(responses(&system), [Some(n(1)), Some(n(15)), Some(n(14))]);
     assert!(!system.is_feasible().unwrap());
 }
@@ -59,7 +60,7 @@ fn those_of_one_thread_wait_for_each_other() {
 fn one_that_another_makes_run_is_as_late_as_that_one_may_end() {
     // A chain on two threads: the source has 2 of 20, and 3 above it of 10; who runs for it comes up to 5 late.
     let agents = vec![agent(3, 10, 0, clock(10)), agent(2, 20, 1, clock(20)), agent(4, 20, 2, after(1))];
-    let system = System { agents, executors: executors(3) };
+    let system = System { processors: 1, agents, executors: executors(3) };
     let found = system.analyse().unwrap();
     assert_eq!(found[1].response, Some(n(5)));
     assert_eq!(found[2].streams[0].jitter, n(5));
@@ -77,6 +78,7 @@ fn one_that_another_makes_run_is_as_late_as_that_one_may_end() {
 #[test]
 fn what_others_send_seldom_or_in_bursts_makes_run_as_often_as_allowed() {
     let mut system = System {
+        processors: 1,
         agents: vec![agent(1, 10, 0, clock(10)), agent(1, 10, 1, after(0))],
         executors: executors(2),
     };
@@ -97,7 +99,7 @@ fn circles_are_named() {
         agent(1, 9, 0, after(1)),
         agent(1, 9, 0, after(2)),
     ];
-    let system = System { agents, executors: executors(1) };
+    let system = System { processors: 1, agents, executors: executors(1) };
     let Err(Unsound::Circle(circle)) = system.analyse() else { panic!("no circle") };
     let first = circle.iter().position(|at| *at == 1).unwrap();
     let turned: Vec<usize> = (0..3).map(|at| circle[(first + at) % 3]).collect();
@@ -108,6 +110,7 @@ fn circles_are_named() {
 fn nothing_is_promised_to_ordinary_threads_and_they_keep_nobody_waiting() {
     let ordinary = Executor { priority: None, may: ANYWHERE };
     let system = System {
+        processors: 1,
         agents: vec![agent(1000, 10, 0, clock(10)), agent(2, 10, 1, clock(10)), agent(1, 20, 1, after(0))],
         executors: vec![ordinary, Executor { priority: Some(1), may: ANYWHERE }],
     };
@@ -151,7 +154,7 @@ fn drawn() -> impl Strategy<Value = Drawn> {
                 may: if processors == 1 { 1 } else { may },
             });
             Drawn {
-                system: System { agents: agents.collect(), executors: executors.collect() },
+                system: System { processors, agents: agents.collect(), executors: executors.collect() },
                 processors,
                 chance,
             }

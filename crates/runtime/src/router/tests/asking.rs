@@ -7,7 +7,7 @@ use crate::agent::{Agent, Fault, Step};
 use crate::plan::{AgentPlan, Plan, WirePlan};
 use crate::port::{Decision, Input, NotAsked, Output, Port, REQUESTS_UNDER_WAY, Router, Why};
 use crate::request::{FaultKind, Request};
-use crate::{LogChoice, registry};
+use crate::{Options, registry};
 use types::messages::Twist;
 use types::{Duration, Time};
 
@@ -43,7 +43,7 @@ fn agent(name: &str, executor: &str) -> AgentPlan {
 fn world() -> World {
     let mut plan = Plan::new("world");
     plan.agents = vec![agent("a", "reflex"), agent("b", "control"), agent("c", "vision")];
-    let built = crate::system::build(&plan, &registry![Asks], LogChoice::default(), Time::ZERO).unwrap();
+    let built = crate::system::build(&plan, &registry![Asks], &Options::default(), Time::ZERO).unwrap();
     let context = crate::context::Context::new(None, built.directory);
     World { router: built.router, cores: built.cores, context, now: Time::ZERO }
 }
