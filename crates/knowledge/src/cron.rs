@@ -5,6 +5,8 @@ use std::str::FromStr;
 
 use types::{Duration, Time};
 
+use crate::Date;
+
 /// Minute, hour, day of the month, month and day of the week, as in `30 8 * * mon-fri`: half past eight on working days.
 ///
 /// | field | values |
@@ -167,26 +169,12 @@ impl Cron {
 
     /// Whether the day, counted from 1970-01-01, fits.
     fn has_day(&self, day: i64) -> bool {
-        let (month, day_of_month) = month_and_day(day);
+        let Date { month, day: day_of_month, .. } = Date::of_day(day);
         // The first day was a Thursday.
         let weekday = (day + 4).rem_euclid(7) as u32;
         let (by_month, by_week) = (self.fits(2, day_of_month), self.fits(4, weekday));
         self.fits(3, month) && if self.either { by_month || by_week } else { by_month && by_week }
     }
-}
-
-/// Month and day of the month of a day that is counted from 1970-01-01, in the Gregorian calendar.
-///
-/// Years are thought to begin in March, so that the leap day is their last (Howard Hinnant, "chrono-Compatible Low-Level Date
-/// Algorithms", `civil_from_days`).
-fn month_and_day(day: i64) -> (u32, u32) {
-    let day_of_era = (day + 719_468).rem_euclid(146_097);
-    let year_of_era = (day_of_era - day_of_era / 1460 + day_of_era / 36_524 - day_of_era / 146_096) / 365;
-    let day_of_year = day_of_era - (365 * year_of_era + year_of_era / 4 - year_of_era / 100);
-    let month = (5 * day_of_year + 2) / 153;
-    let day_of_month = day_of_year - (153 * month + 2) / 5 + 1;
-    let month = if month < 10 { month + 3 } else { month - 9 };
-    (month as u32, day_of_month as u32)
 }
 
 #[cfg(test)]

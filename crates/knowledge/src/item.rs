@@ -86,8 +86,11 @@ pub struct Listed {
 }
 
 impl Item {
-    /// Refuses what is not as it must be.
-    pub(crate) fn check(&self) -> Result<()> {
+    /// Whether it is as it must be; what is not is never put.
+    ///
+    /// # Errors
+    /// [`KnowledgeError::Wrong`](crate::KnowledgeError::Wrong) says what is wrong, and how it is mended.
+    pub fn check(&self) -> Result<()> {
         match self {
             Item::Table(one) => one.check(),
             Item::Fact(one) => one.check(),

@@ -39,6 +39,7 @@
 #![forbid(unsafe_code)]
 
 mod cron;
+mod date;
 mod error;
 mod fact;
 mod item;
@@ -52,6 +53,7 @@ mod table;
 mod text;
 
 pub use cron::{Cron, NotCron};
+pub use date::Date;
 pub use error::KnowledgeError;
 pub use fact::{Fact, Query, Reach, Reached};
 pub use item::{Item, Kind, Listed};

@@ -10,7 +10,7 @@ use runtime::Registry;
 use types::Duration;
 
 use crate::error::Failure;
-use crate::{analyze, bench, live, log, run, terminal, tools};
+use crate::{analyze, bench, know, live, log, run, terminal, tools};
 
 /// Many agents, one robot, in time: runs systems of agents on robots, in simulation and on recorded data.
 ///
@@ -40,6 +40,8 @@ enum Command {
     /// Looks into logs, draws them, plays them, mends them.
     #[command(subcommand)]
     Log(log::LogCommand),
+    /// What is known from one run to the next: decision tables, facts, patterns, schedules, maps.
+    Know(know::KnowArgs),
     /// Writes a template that builds, runs and has a test.
     #[command(subcommand)]
     New(tools::NewCommand),
@@ -220,6 +222,7 @@ fn done(command: Command, registry: Registry, json: bool) -> Result<ExitCode, Fa
         Command::Analyze(args) => analyze::analyze(&args, &registry, json),
         Command::Schema => Ok(tools::print_schema(&registry)),
         Command::Log(command) => log::log(command, json),
+        Command::Know(args) => know::know(&args, json),
         Command::New(command) => tools::make(&command, json),
         Command::Doctor => Ok(tools::examine(json)),
         Command::Bench(args) => bench::bench(&args, &registry, json),

@@ -11,6 +11,7 @@
 //! | a run from its file to its summary, log and figures | `run`, `figures` |
 //! | asking a system that runs | `live` |
 //! | what is done with logs | `log` |
+//! | what is known from run to run | `know` |
 //! | measurements | `bench` |
 
 mod analyze;
@@ -20,6 +21,7 @@ pub mod doctor;
 mod error;
 mod figures;
 pub mod file;
+mod know;
 mod live;
 mod log;
 pub mod new;

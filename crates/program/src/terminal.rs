@@ -1,10 +1,11 @@
 //! Where text goes: the one place that prints, besides failures, and that knows whether people are watching.
 
 use std::io::{self, IsTerminal as _, Write as _};
-use std::time::Instant;
+use std::time::{Instant, SystemTime};
 
 use indicatif::{ProgressBar, ProgressStyle};
 use serde_json::Value as Json;
+use types::Time;
 
 /// What a command has to say on standard output. Nobody is left to be told when the stream is closed.
 pub(crate) fn say(text: &str) {
@@ -45,6 +46,13 @@ pub(crate) fn paint(on: bool, code: &str, text: &str) -> String {
 #[allow(clippy::disallowed_methods)] // The program may look at the clock here, and nowhere else.
 pub(crate) fn host_now() -> Instant {
     Instant::now()
+}
+
+/// The host's date, for what is written down; never a clock of a run.
+#[allow(clippy::disallowed_methods)] // The program may look at the clock here, and nowhere else.
+pub(crate) fn host_date() -> Time {
+    let since_1970 = SystemTime::now().duration_since(SystemTime::UNIX_EPOCH).unwrap_or_default();
+    Time(i64::try_from(since_1970.as_nanos()).unwrap_or(i64::MAX))
 }
 
 /// Waits on the host's clock. For threads that look now and then, never for one that runs agents.

@@ -27,6 +27,7 @@
 
 pub use agents;
 pub use hardware;
+pub use knowledge;
 pub use motion;
 pub use perception;
 pub use program::program;

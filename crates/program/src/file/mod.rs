@@ -28,9 +28,11 @@ pub(crate) mod tree;
 mod wires;
 mod write;
 
+pub(crate) use decide::read_alone;
 pub use library::{Found, Shelf};
 pub(crate) use read::SECTIONS;
 pub use read::{Loaded, check, load, read, read_plan};
+pub(crate) use set::set_in;
 pub use sources::{Mistakes, Sources};
 pub use write::write_plan;
 

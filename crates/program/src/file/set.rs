@@ -11,23 +11,54 @@ use super::{Sources, tree};
 /// # Errors
 /// When there is no `=`, or the path leads to no entry that could be.
 pub(super) fn set(tree: &mut Table, sources: &mut Sources, assignment: &str) -> Result<(), Mistake> {
-    let base = sources.add("--set", assignment);
-    let length = assignment.len() as u32;
-    let Some((key, value)) = assignment.split_once('=') else {
-        return Err(Mistake::new(Span { start: base, end: base + length.max(1) }, "there is no \"=\"")
-            .help("write KEY=VALUE, as in --set agent.sonar.period=250ms"));
-    };
-    let key_at = Span { start: base, end: base + key.len().max(1) as u32 };
-    let value_at = Span { start: key_at.end + 1, end: base + length };
-    let path = key.replace('"', "");
-    let parts: Vec<&str> = path.trim().split('.').map(str::trim).collect();
-    if parts.iter().any(|part| part.is_empty()) {
-        return Err(Mistake::new(key_at, format!("\"{}\" is no path of names", key.trim()))
-            .help("write it as in agent.sonar.period"));
-    }
+    let Assignment { parts, key_at, entry } = Assignment::read(sources, assignment)?;
+    let parts: Vec<&str> = parts.iter().map(String::as_str).collect();
     known_owner(tree, &parts, key_at)?;
-    let entry = Entry { value: tree::value(value.trim(), value_at), at: value_at };
     put(tree, &parts, entry, key_at, parts[0])
+}
+
+/// Does one `KEY=VALUE` to a section that stands by itself: its name is no part of the key.
+///
+/// # Errors
+/// As [`set`].
+pub(crate) fn set_in(
+    table: &mut Table,
+    sources: &mut Sources,
+    assignment: &str,
+    section: &str,
+) -> Result<(), Mistake> {
+    let Assignment { parts, key_at, entry } = Assignment::read(sources, assignment)?;
+    let parts: Vec<&str> = parts.iter().map(String::as_str).collect();
+    put(table, &parts, entry, key_at, section)
+}
+
+/// A `KEY=VALUE` that was taken apart.
+struct Assignment {
+    /// The parts of the key, at least one, none of them empty.
+    parts: Vec<String>,
+    key_at: Span,
+    entry: Entry,
+}
+
+impl Assignment {
+    fn read(sources: &mut Sources, assignment: &str) -> Result<Assignment, Mistake> {
+        let base = sources.add("--set", assignment);
+        let length = assignment.len() as u32;
+        let Some((key, value)) = assignment.split_once('=') else {
+            return Err(Mistake::new(Span { start: base, end: base + length.max(1) }, "there is no \"=\"")
+                .help("write KEY=VALUE, as in --set agent.sonar.period=250ms"));
+        };
+        let key_at = Span { start: base, end: base + key.len().max(1) as u32 };
+        let value_at = Span { start: key_at.end + 1, end: base + length };
+        let path = key.replace('"', "");
+        let parts: Vec<String> = path.trim().split('.').map(|part| part.trim().to_owned()).collect();
+        if parts.iter().any(String::is_empty) {
+            return Err(Mistake::new(key_at, format!("\"{}\" is no path of names", key.trim()))
+                .help("write it as in agent.sonar.period"));
+        }
+        let entry = Entry { value: tree::value(value.trim(), value_at), at: value_at };
+        Ok(Assignment { parts, key_at, entry })
+    }
 }
 
 /// A misspelt agent or robot would make a new one: it is refused instead.
