@@ -88,6 +88,16 @@ pub(crate) fn look(connection: &Connection, file: &Path, steps: &[&str]) -> Resu
     }
 }
 
+/// The same, and refuses a file of a known form that is damaged; all of one moment.
+pub(crate) fn look_through(connection: &Connection, file: &Path, steps: &[&str]) -> Result<Form> {
+    let moment = connection.unchecked_transaction().map_err(|error| KnowledgeError::of(file, &error))?;
+    let form = look(&moment, file, steps)?;
+    if let Form::Known(form) = form {
+        check(&moment, file, &steps[..form])?;
+    }
+    Ok(form)
+}
+
 /// Mark, number of the form, and how many tables there are, all of one moment.
 fn head(connection: &Connection) -> rusqlite::Result<(i64, i64, i64)> {
     let _moment = connection.is_autocommit().then(|| connection.unchecked_transaction()).transpose()?;
@@ -121,7 +131,7 @@ pub(crate) fn bring_up(connection: &mut Connection, file: &Path, steps: &[&str])
 }
 
 /// Refuses a file whose tables are not the ones of its form, or whose pages do not fit together.
-pub(crate) fn check(connection: &Connection, file: &Path, steps: &[&str]) -> Result<()> {
+fn check(connection: &Connection, file: &Path, steps: &[&str]) -> Result<()> {
     let failed = |error: rusqlite::Error| KnowledgeError::of(file, &error);
     let right = Connection::open_in_memory().map_err(failed)?;
     steps.iter().try_for_each(|step| right.execute_batch(step)).map_err(failed)?;

@@ -40,13 +40,10 @@ impl Knowledge {
         check_path(file)?;
         let mut connection =
             connect(file, OpenFlags::SQLITE_OPEN_READ_WRITE | OpenFlags::SQLITE_OPEN_CREATE)?;
-        let form = layout::look(&connection, file, STEPS)?;
+        layout::look_through(&connection, file, STEPS)?;
         if connection.is_readonly("main").unwrap_or(true) {
             let why = "it may be read only".to_owned();
             return Err(KnowledgeError::NoAccess { file: file.to_owned(), why });
-        }
-        if let Form::Known(form) = form {
-            layout::check(&connection, file, &STEPS[..form])?;
         }
         log_ahead(&connection, file)?;
         layout::bring_up(&mut connection, file, STEPS)?;
@@ -68,15 +65,22 @@ impl Knowledge {
         connection
             .execute_batch("PRAGMA query_only = ON")
             .map_err(|error| KnowledgeError::of(file, &error))?;
-        match layout::look(&connection, file, STEPS)? {
-            Form::Fresh => return Err(KnowledgeError::NotThere { file: file.to_owned() }),
+        let form = layout::look_through(&connection, file, STEPS).map_err(|error| match error {
+            KnowledgeError::NoAccess { file, why } => {
+                let why =
+                    format!("{why}; who reads needs two files beside it, or a folder in which to make them");
+                KnowledgeError::NoAccess { file, why }
+            }
+            other => other,
+        })?;
+        match form {
+            Form::Fresh => Err(KnowledgeError::NotThere { file: file.to_owned() }),
             Form::Known(found) if found < STEPS.len() => {
                 let (found, known) = (found as i64, STEPS.len() as i64);
-                return Err(KnowledgeError::Older { file: file.to_owned(), found, known });
+                Err(KnowledgeError::Older { file: file.to_owned(), found, known })
             }
-            Form::Known(_) => layout::check(&connection, file, STEPS)?,
+            Form::Known(_) => Ok(Knowledge { file: file.to_owned(), connection }),
         }
-        Ok(Knowledge { file: file.to_owned(), connection })
     }
 
     /// The file.

@@ -93,3 +93,16 @@ fn many_steps_lead_through_the_house_and_a_circle_ends() {
     assert_eq!(reached(ghost), [pair("mirror", 1)]);
     assert_eq!(reached(Reach::to("in", "nowhere")), []);
 }
+
+#[test]
+fn many_ways_to_one_thing_are_one() {
+    let folder = Folder::new();
+    let mut knowledge = Knowledge::open(folder.file()).unwrap();
+    // Each leads to each other: there are more ways than could be walked.
+    let ends = (0..20).flat_map(|a| (0..20).map(move |b| (a, b)));
+    let facts = ends.map(|(a, b)| Fact::new(format!("n{a}"), "near", format!("n{b}"), Time::ZERO).into());
+    knowledge.put_all(facts).unwrap();
+    let reached = knowledge.read().unwrap().reach(&Reach::from("n0", "near")).unwrap();
+    assert_eq!(reached.len(), 19);
+    assert!(reached.iter().all(|reached| reached.steps == 1));
+}

@@ -2,7 +2,7 @@
 
 use std::sync::atomic::{AtomicBool, Ordering};
 
-use knowledge::{Fact, Item, Knowledge, Query};
+use knowledge::{Fact, Item, Knowledge, Query, Snapshot};
 use types::Time;
 
 use crate::Folder;
@@ -72,4 +72,18 @@ fn writers_take_turns_from_the_first_moment_of_the_file_on() {
     });
     let mut knowledge = Knowledge::open_read_only(folder.file()).unwrap();
     assert_eq!(knowledge.read().unwrap().facts(&Query::default()).unwrap().len(), 80);
+}
+
+#[test]
+fn a_snapshot_is_of_the_moment_at_which_it_was_taken() {
+    let folder = Folder::new();
+    let mut writer = Knowledge::open(folder.file()).unwrap();
+    writer.put_all(pair(1)).unwrap();
+    let mut reader = Knowledge::open_read_only(folder.file()).unwrap();
+    let count = |known: &Snapshot<'_>| known.facts(&Query::default()).unwrap().len();
+    let before = reader.read().unwrap();
+    writer.put_all(pair(2)).unwrap();
+    assert_eq!(count(&before), 2);
+    drop(before);
+    assert_eq!(count(&reader.read().unwrap()), 4);
 }

@@ -88,7 +88,7 @@ pub(super) struct ScheduleArgs {
     /// At this time of the clock, as in 30s; once, unless --every is given.
     #[arg(long, value_name = "TIME")]
     at: Option<Duration>,
-    /// What to ask, as [[at]] of a system file has it.
+    /// What to ask, as the timed requests of a system file do.
     #[arg(value_name = "DO", required = true)]
     words: Vec<String>,
 }
