@@ -354,7 +354,12 @@ mod tests {
     #[test]
     fn this_machine_can_be_examined() {
         let examination = examine();
-        assert_eq!(examination.lines.len(), 10);
+        assert_eq!(examination.lines.len(), 11);
+        let around = &examination.lines[10];
+        assert!(
+            around.name == "around a step" && around.found.contains("µs of processor time"),
+            "{around:?}"
+        );
         let priority = &examination.lines[2].found;
         assert!(priority.contains("got fifo 70") || priority.contains("got ordinary"), "{priority}");
     }

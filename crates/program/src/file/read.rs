@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use runtime::{AgentPlan, ExecutorPlan, Plan, Registry};
+use runtime::{AgentPlan, Assumed, ExecutorPlan, Plan, Registry, timetable};
 use sim::{Goal, Model, Vary, WorldPlan};
 use types::Duration;
 use types::value::{Entry, Mistake, Span, Table, TableReader, Value, nearest};
@@ -181,6 +181,28 @@ impl<'r> Reader<'r> {
         let judged = runtime::check(&self.plan, self.registry);
         let spoiled = &self.spoiled;
         self.mistakes.extend(judged.into_iter().filter(|mistake| !spoiled.contains(&mistake.at)));
+        self.circle();
+    }
+
+    /// Agents that make each other run without end, where all else is right.
+    fn circle(&mut self) {
+        if !self.mistakes.is_empty() {
+            return;
+        }
+        let is_robot = |port: &str| self.robots.get(runtime::owner(port)).is_some();
+        let pace = |port: &str| is_robot(port).then_some(hardware::robot::CYCLE);
+        let assumed =
+            Assumed { cost: &|_| Duration::ZERO, processors: 1, overhead: Duration::ZERO, pace: &pace };
+        let table = timetable(&self.plan, self.registry, &assumed);
+        if let Err(schedule::system::Unsound::Circle(circle)) = table.system.analyse() {
+            let agents: Vec<&AgentPlan> = circle.iter().map(|at| &self.plan.agents[*at]).collect();
+            let mut names: Vec<&str> = agents.iter().map(|agent| agent.name.as_str()).collect();
+            names.extend(names.first().copied());
+            let what = format!("agents make each other run in a circle: {}", names.join(" → "));
+            let at = agents.iter().map(|agent| agent.at).min_by_key(|at| at.start).unwrap_or_default();
+            let help = "one of them should have a period, and not be on what the one before it sends";
+            self.mistakes.push(Mistake::new(at, what).help(help));
+        }
     }
 
     /// Reports the sections that nobody knows.
