@@ -10,7 +10,7 @@
 //! | `queues` | rows of `name`, `message` (null before anybody is wired to it), `depth`, `overload`, `waiting`, `sent`, `dropped`, `refused`, `taken`, `receivers`: rows of `to`, `serving`, `taken`; what was sent and taken on wires that are gone counts too |
 //! | filter | `category` (null for all), `priority` (the least), `marker`, `recipient` (the name of an agent, null for all), `every` |
 //!
-//! `time_s` is the system's own clock (s). `asked` and `granted` are the scheduling, as in `fifo 70`. Whatever was asked for and
+//! `time_s` is the system's own clock (s). `asked` and `granted` are the scheduling, as in `fifo 70`, or `deadline 2420us/20ms/20ms`. Whatever was asked for and
 //! not granted, dropped or missed is in these numbers.
 
 use runtime::{

@@ -1,6 +1,6 @@
 //! The JSON schema of system files, for editors: the agent types of this program with their parameters, docs and ranges.
 
-use runtime::{AgentType, Direction, ExecutorPlan, Overload, PortInfo, Registry};
+use runtime::{AgentType, Direction, ExecutorPlan, Overload, Policy, PortInfo, Registry};
 use serde_json::{Map, Value as Json, json};
 use types::params::ParamField;
 use types::value::{Table, Value};
@@ -208,7 +208,17 @@ fn executor() -> Json {
     let cpus = json!({"type": "array", "items": {"type": "integer", "minimum": 0},
         "description": "The processors on which it may run."});
     let spin = time("How long before a release it stops sleeping and watches the clock.");
-    closed([("priority", priority), ("cpus", cpus), ("spin", spin)], &[])
+    let policy = choice(
+        Policy::ALL.map(Policy::name),
+        "By which rule the thread runs: by its priority, or by the deadline of its one agent.",
+    );
+    let mut schema =
+        closed([("policy", policy), ("priority", priority), ("cpus", cpus), ("spin", spin)], &[]);
+    let other = |entry: &str| json!({"not": {"required": [entry]}});
+    schema["if"] = json!({"properties": {"policy": {"const": "deadline"}}, "required": ["policy"]});
+    let none = ["priority", "cpus", "spin"].map(other);
+    schema["then"] = json!({"allOf": none});
+    schema
 }
 
 const POLICIES: [Overload; 3] = [Overload::NewestWins, Overload::OldestWins, Overload::Refuse];

@@ -2,15 +2,17 @@
 
 use std::collections::HashMap;
 
+use types::Duration;
 use types::value::{Mistake, Span};
 
 use crate::agent::{AgentType, Registry};
+use crate::budget::budget_of;
 use crate::message_type::MessageType;
 use crate::plan::{AgentPlan, ExecutorPlan, Plan, WirePlan};
 use crate::port::Direction;
 use crate::queue_plan::{QueueSide, check_wire, other_type, serving_elsewhere};
 use crate::request::Refusal;
-use crate::router::{robot_wires, timing_of};
+use crate::router::{has_its_agent, robot_wires, timing_of, usual_executor};
 
 /// All mistakes of a plan, in the order of the file as far as places are known.
 pub fn check(plan: &Plan, registry: &Registry) -> Vec<Mistake> {
@@ -56,6 +58,17 @@ pub fn wires_of(plan: &Plan, registry: &Registry) -> Vec<WirePlan> {
     wires
 }
 
+/// An executor that runs by its agent's deadline has something that it cannot have.
+pub fn not_by_deadline(executor: &str, what: &str, at: Span) -> Mistake {
+    let why = match what {
+        "priority" => "stands above all priorities",
+        "cpus" => "runs on all processors: the kernel takes no other",
+        _ => "sleeps until its time",
+    };
+    Mistake::new(at, format!("executor \"{executor}\" has \"{what}\" under policy \"deadline\""))
+        .help(format!("one by deadline {why}"))
+}
+
 struct Checker<'a> {
     plan: &'a Plan,
     /// The first of each name.
@@ -78,14 +91,31 @@ impl<'a> Checker<'a> {
                 );
                 self.say(executor.at, what);
             }
+            if executor.is_by_deadline() {
+                self.by_deadline(executor);
+            }
             if self.plan.executors[..i].iter().any(|other| other.name == executor.name) {
                 self.say(executor.at, format!("there are two executors \"{}\"", executor.name));
             }
         }
     }
 
+    /// What an executor cannot have that runs by its agent's deadline.
+    fn by_deadline(&mut self, executor: &ExecutorPlan) {
+        let has = [
+            ("priority", executor.priority.is_some()),
+            ("cpus", !executor.cpus.is_empty()),
+            ("spin", executor.spin != Duration::ZERO),
+        ];
+        for (what, _) in has.iter().filter(|(_, has)| *has) {
+            self.mistakes.push(not_by_deadline(&executor.name, what, executor.at));
+        }
+    }
+
     fn agents(&mut self) {
         let executors = executors_of(self.plan);
+        // Who is the first on each executor that runs by its agent's deadline.
+        let mut first: HashMap<&str, &str> = HashMap::new();
         for agent in &self.plan.agents {
             if self.agents.get(agent.name.as_str()).is_some_and(|first| !core::ptr::eq(*first, agent)) {
                 self.say(agent.at, format!("there are two agents \"{}\"", agent.name));
@@ -113,8 +143,22 @@ impl<'a> Checker<'a> {
                     ));
                 }
             }
-            if let Err(refusal) = timing_of(agent) {
-                self.mistakes.push(Mistake { at: agent.at, what: refusal.what, help: refusal.help });
+            let timing = match timing_of(agent) {
+                Ok(timing) => timing,
+                Err(refusal) => {
+                    self.refuse(agent.at, refusal);
+                    continue;
+                }
+            };
+            let name = agent.executor.as_deref().unwrap_or(usual_executor(timing.deadline));
+            let executor = executors.iter().find(|executor| executor.name == name);
+            let Some(executor) = executor.filter(|executor| executor.is_by_deadline()) else { continue };
+            match first.get(executor.name.as_str()) {
+                Some(other) => self.refuse(agent.at, has_its_agent(&executor.name, other, &agent.name)),
+                None => drop(first.insert(&executor.name, &agent.name)),
+            }
+            if let Err(against) = budget_of(agent, &timing) {
+                against.into_iter().for_each(|refusal| self.refuse(agent.at, refusal));
             }
         }
     }

@@ -22,6 +22,7 @@ pub(crate) use change::{Answer, Change, Link, Room};
 use self::due::{Due, MANY};
 use self::ready::ReadySet;
 use crate::agent::{Body, Fault};
+use crate::budget::Budget;
 use crate::door::{CHANGES, Door};
 use crate::fetch::{Depth, fetch};
 use crate::handover::Running;
@@ -40,6 +41,8 @@ pub(crate) struct Timing {
     pub min_gap: Duration,
     /// How long a step may last before it is taken for one that does not return.
     pub hang_after: Duration,
+    /// What it needs where its executor runs by its deadline; nothing where that is not known.
+    pub budget: Option<Budget>,
 }
 
 /// An agent's place in an executor. What every step uses stands together.
@@ -203,6 +206,11 @@ impl Core {
     #[inline]
     pub(crate) fn next_release(&self) -> Time {
         self.releases.peek().map_or(Time::NEVER, |Reverse((time, _))| *time)
+    }
+
+    /// What the one agent needs of an executor that runs by its deadline.
+    pub(crate) fn budget(&self) -> Option<Budget> {
+        self.seats.iter().flatten().next()?.timing.budget
     }
 
     /// Whether nobody has rung, nobody is ready and nothing is due: most looks find that.

@@ -69,6 +69,7 @@ extern crate self as runtime;
 
 mod agent;
 mod allocations;
+mod budget;
 mod check;
 mod composition;
 mod context;
@@ -107,7 +108,7 @@ pub use agent::{
     ServiceEnd, Step,
 };
 pub use allocations::Watched;
-pub use check::{check, executors_of, wires_of};
+pub use check::{check, executors_of, not_by_deadline, wires_of};
 pub use composition::{Composition, End, Left, Member, PortAt, PortSeen, QueueSeen, WireSeen};
 pub use executor::{Cause, StepFault};
 pub use fetch::Depth;
@@ -117,8 +118,8 @@ pub use memory::Found;
 pub use message_type::{LARGEST_BY_VALUE, MessageType};
 pub use os::processor_time;
 pub use plan::{
-    AgentPlan, ExecutorPlan, OnDeath, Plan, TimedRequest, USUAL_DEPTH, USUAL_DEPTH_ON, Wirable, WireFilter,
-    WirePlan, owner, value_of,
+    AgentPlan, ExecutorPlan, OnDeath, Plan, Policy, TimedRequest, USUAL_DEPTH, USUAL_DEPTH_ON, Wirable,
+    WireFilter, WirePlan, owner, value_of,
 };
 pub use port::{
     Decision, Direction, Envelope, Gives, Input, Look, NotAsked, Output, OutputFault, OwnAddress, OwnPort,

@@ -9,6 +9,10 @@ use core::sync::atomic::AtomicU32;
 use core::sync::atomic::{AtomicI32, Ordering};
 use std::io;
 
+use types::Duration;
+
+use crate::budget::Budget;
+
 /// Waits while `word` is `expected`, until it is woken or `until` (monotonic clock, nanoseconds) has come.
 #[cfg(not(loom))]
 pub(crate) fn futex_wait(word: &AtomicU32, expected: u32, until: Option<i64>) {
@@ -73,8 +77,57 @@ pub(crate) fn set_fifo(priority: u8) -> io::Result<()> {
     checked(unsafe { libc::sched_setscheduler(0, libc::SCHED_FIFO, &param) })
 }
 
+/// Gives a thread, zero for the calling one, a budget under `SCHED_DEADLINE`. Threads that it makes are ordinary ones: else it could make none. As for a
+/// priority, not under ThreadSanitizer.
+pub(crate) fn set_deadline(thread: i32, budget: Budget) -> io::Result<()> {
+    if cfg!(tsan) {
+        return Ok(());
+    }
+    let attributes = libc::sched_attr {
+        size: size_of::<libc::sched_attr>() as u32,
+        sched_policy: libc::SCHED_DEADLINE as u32,
+        sched_flags: libc::SCHED_FLAG_RESET_ON_FORK as u64,
+        sched_nice: 0,
+        sched_priority: 0,
+        sched_runtime: budget.runtime.0 as u64,
+        sched_deadline: budget.deadline.0 as u64,
+        sched_period: budget.period.0 as u64,
+    };
+    // SAFETY: the number names a thread or none; the attributes are valid and say how long they are.
+    checked(unsafe { libc::syscall(libc::SYS_sched_setattr, thread, &raw const attributes, 0) } as libc::c_int)
+}
+
+/// The budget that a thread, zero for the calling one, has under `SCHED_DEADLINE`, if it runs under that.
+pub(crate) fn deadline_of(thread: i32) -> Option<Budget> {
+    // SAFETY: all zero is a valid value of plain numbers.
+    let mut attributes: libc::sched_attr = unsafe { core::mem::zeroed() };
+    let size = size_of::<libc::sched_attr>();
+    // SAFETY: the number names a thread or none; the place is valid and of the size that is told.
+    checked(unsafe { libc::syscall(libc::SYS_sched_getattr, thread, &raw mut attributes, size, 0) }
+        as libc::c_int)
+    .ok()?;
+    let time = |nanos: u64| Duration(nanos as i64);
+    (attributes.sched_policy == libc::SCHED_DEADLINE as u32).then(|| Budget {
+        runtime: time(attributes.sched_runtime),
+        deadline: time(attributes.sched_deadline),
+        period: time(attributes.sched_period),
+    })
+}
+
+/// Makes the calling thread an ordinary one.
+pub(crate) fn set_ordinary() -> io::Result<()> {
+    let param = libc::sched_param { sched_priority: 0 };
+    // SAFETY: zero is the calling thread; `param` is valid.
+    checked(unsafe { libc::sched_setscheduler(0, libc::SCHED_OTHER, &param) })
+}
+
 /// Lets a thread run only when nothing else wants to: for one that does not come back.
 pub(crate) fn set_idle(thread: i32) -> io::Result<()> {
+    if deadline_of(thread).is_some() {
+        // The kernel keeps the budget of a thread that leaves the policy until its deadline has come, and gives it to nobody else; what a change
+        // takes away is free at once.
+        let _ = set_deadline(thread, Budget::NONE);
+    }
     let param = libc::sched_param { sched_priority: 0 };
     // SAFETY: the number names a thread of this process or none; `param` is valid.
     checked(unsafe { libc::sched_setscheduler(thread, libc::SCHED_IDLE, &param) })

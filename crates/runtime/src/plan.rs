@@ -6,7 +6,7 @@ use types::value::{Mistake, Span, Table, Value};
 use types::{AgentId, Category, Duration, Filter, Message};
 
 use crate::agent::{ClientEnd, Declare, InputEnd as To, OutputEnd as From, ServiceEnd};
-use crate::queue_plan::{Queue, QueuePlan};
+use crate::queue_plan::{MOST_SERVING, Queue, QueuePlan};
 use crate::ring::Overload;
 
 /// The one value that describes a system: agents, wires, executors, what happens when, and the sections of others.
@@ -28,6 +28,37 @@ pub struct Plan {
     pub sections: Table,
 }
 
+/// By which rule the kernel lets the thread of an executor run.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Policy {
+    /// By its priority, first in, first out; where it has none it is an ordinary thread.
+    #[default]
+    Fifo,
+    /// `SCHED_DEADLINE`: above all priorities, and among its like whoever has the earliest deadline. The kernel takes a thread in only if there is
+    /// time left for it, and gives it no more than it asked for: in each period of its agent the declared cost and a fifth more, by the deadline.
+    /// What makes the agent run besides its period and its messages, answers and steps that it asks for itself, has to do with that.
+    ///
+    /// The executor has one agent alone, which declares its cost, and where messages make it run a least time between. It has neither priority
+    /// nor processors of its own (the kernel takes no such thread), and does not watch the clock in place of sleeping.
+    Deadline,
+}
+
+impl Policy {
+    /// All of them.
+    pub const ALL: [Policy; 2] = [Policy::Fifo, Policy::Deadline];
+
+    /// Its name in files.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Policy::Fifo => "fifo",
+            Policy::Deadline => "deadline",
+        }
+    }
+}
+
+/// Where executors under [`Policy::Deadline`] stand among the others: above the witness too.
+pub(crate) const ABOVE_ALL: u8 = 100;
+
 /// An executor in a plan.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ExecutorPlan {
@@ -35,6 +66,8 @@ pub struct ExecutorPlan {
     pub name: String,
     /// Real-time priority from 1 to 99; nothing for an ordinary thread.
     pub priority: Option<u8>,
+    /// By which rule it runs.
+    pub policy: Policy,
     /// The processors on which it may run; all when empty.
     pub cpus: Vec<usize>,
     /// How long before a release the thread stops sleeping and watches the clock instead: exact, at the cost of a processor.
@@ -160,7 +193,27 @@ impl ExecutorPlan {
     /// An executor on all processors.
     pub fn new(name: &str, priority: Option<u8>) -> ExecutorPlan {
         let (name, at) = (name.to_owned(), Span::default());
-        ExecutorPlan { name, priority, cpus: Vec::new(), spin: Duration::ZERO, at }
+        ExecutorPlan { name, priority, policy: Policy::Fifo, cpus: Vec::new(), spin: Duration::ZERO, at }
+    }
+
+    /// An executor whose thread runs by its agent's deadline.
+    pub fn by_deadline(name: &str) -> ExecutorPlan {
+        ExecutorPlan { policy: Policy::Deadline, ..ExecutorPlan::new(name, None) }
+    }
+
+    /// Whether it runs by its agent's deadline.
+    pub fn is_by_deadline(&self) -> bool {
+        self.policy == Policy::Deadline
+    }
+
+    /// Where it stands among the others, the greater above; nothing for an ordinary thread.
+    pub fn level(&self) -> Option<u8> {
+        if self.is_by_deadline() { Some(ABOVE_ALL) } else { self.priority }
+    }
+
+    /// Who is served first out of a queue, unless its wire says otherwise.
+    pub(crate) fn usual_serving(&self) -> u8 {
+        self.level().unwrap_or(0).min(MOST_SERVING)
     }
 
     /// The usual executors of a robot, the highest first.

@@ -202,7 +202,11 @@ pub(crate) struct Stopwatch<'a> {
     pub witness: &'a Witness,
     processors: &'a Processors,
     /// The real-time priority that was granted; zero for an ordinary thread.
-    level: u64,
+    level: Cell<u64>,
+    /// The processor time in a period that was granted under `SCHED_DEADLINE`.
+    budget: Cell<Option<Duration>>,
+    /// The executor's number.
+    executor: usize,
     /// The one processor on which the thread may run, and what has been used of it.
     only: Option<(usize, &'a AtomicU64)>,
     pace: Pace,
@@ -214,14 +218,24 @@ impl<'a> Stopwatch<'a> {
     pub(crate) fn new(
         witness: &'a Witness,
         processors: &'a Processors,
-        level: u64,
+        executor: usize,
         allowed: &[usize],
         offset: i64,
     ) -> Stopwatch<'a> {
-        processors.highest.0.fetch_max(level, Ordering::Relaxed);
         let only = if let [only] = allowed { Some(*only) } else { None };
         let only = only.and_then(|only| Some((only, &processors.used.get(only)?.0)));
-        Stopwatch { witness, processors, level, only, pace: Pace::new(offset) }
+        let (level, budget) = (Cell::new(0), Cell::new(None));
+        Stopwatch { witness, processors, level, budget, executor, only, pace: Pace::new(offset) }
+    }
+
+    /// Says where the thread stands now: its priority, and what it has under `SCHED_DEADLINE`, where others like it can pre-empt it.
+    pub(crate) fn stands_at(&self, (level, budget): (u64, Option<Duration>)) {
+        let above = level + u64::from(budget.is_some());
+        self.processors.highest.0.fetch_max(above, Ordering::Relaxed);
+        self.level.set(level);
+        self.budget.set(budget);
+        // It is awake.
+        self.witness.works(self.executor, budget.unwrap_or(Duration::ZERO));
     }
 
     /// The present: the end of a step.
@@ -252,7 +266,9 @@ impl<'a> Stopwatch<'a> {
     fn read(&self) -> Reading {
         match self.only {
             Some((only, line)) => Reading::on(only, line),
-            None if self.processors.highest.0.load(Ordering::Relaxed) <= self.level => Reading::of_time(),
+            None if self.processors.highest.0.load(Ordering::Relaxed) <= self.level.get() => {
+                Reading::of_time()
+            }
             None => self.read_any(),
         }
     }
@@ -273,15 +289,29 @@ impl<'a> Stopwatch<'a> {
     /// run, so its time is nobody's loss.
     #[inline]
     pub(crate) fn wake(&self) -> Option<Reading> {
-        (self.level > 0).then(|| self.read_all())
+        if let Some(budget) = self.budget.get() {
+            self.witness.works(self.executor, budget);
+        }
+        (self.level.get() > 0).then(|| self.read_all())
     }
 
     /// The thread is about to sleep: what it used since it woke becomes known.
     #[inline]
     pub(crate) fn rest(&self, woken: &Option<Reading>) {
         if let Some(woken) = woken {
-            self.processors.add(woken, &self.read_all());
+            let now = self.read_all();
+            self.processors.add(woken, &now);
+            if self.budget.get().is_some() {
+                self.rest_above(woken, &now);
+            }
         }
+    }
+
+    /// The witness stands below a thread that runs by its deadline.
+    fn rest_above(&self, woken: &Reading, now: &Reading) {
+        let used = Duration(scaled(woken.own(now), self.pace.rate) as i64);
+        let moved = (woken.processor != now.processor).then_some(now.processor);
+        self.witness.rests(self.executor, [Some(woken.processor), moved], used);
     }
 }
 

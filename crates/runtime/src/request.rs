@@ -263,7 +263,7 @@ pub struct AgentView {
     pub doc: &'static str,
     /// Its executor.
     pub executor: String,
-    /// The scheduling that was asked for, as in `fifo 70`.
+    /// The scheduling that was asked for, as in `fifo 70`, or `deadline 2420us/20ms/20ms`: processor time, by when, and how often.
     pub asked: String,
     /// The scheduling that was granted.
     pub granted: String,

@@ -30,6 +30,7 @@ use types::value::Table;
 use types::{AgentId, Duration, Filter, Priority, Time};
 
 use crate::agent::{AgentType, Body, Registry};
+use crate::budget::budget_of;
 use crate::executor::{Link, StepFault, Timing};
 use crate::log::{LogChoice, LogShared};
 use crate::names::Directory;
@@ -385,6 +386,19 @@ impl Router {
         })
     }
 
+    /// Refuses an agent that needs what its executor cannot give, where that runs by its agent's deadline.
+    fn check_budget(&self, plan: &AgentPlan, timing: &Timing, executor: usize) -> Reply<()> {
+        let on = &self.executors[executor].plan;
+        if !on.is_by_deadline() {
+            return Ok(());
+        }
+        let mut agents = self.agents.values().filter(|known| known.executor == executor);
+        if let Some(other) = agents.find(|known| known.plan.name != plan.name) {
+            return Err(has_its_agent(&on.name, &other.plan.name, &plan.name));
+        }
+        budget_of(plan, timing).map(drop).map_err(all)
+    }
+
     fn output(&self, port: &str) -> Reply<Arc<dyn OutputEnd>> {
         let (agent, place) = self.port(port)?;
         let known = &self.agents[&agent];
@@ -446,6 +460,24 @@ pub fn robot_wires(plan: &AgentPlan, kind: &AgentType, robot: &str) -> Vec<WireP
     wires
 }
 
+/// Why an agent cannot come to an executor that runs by the deadline of another.
+pub(crate) fn has_its_agent(executor: &str, agent: &str, other: &str) -> Refusal {
+    Refusal::new(format!(
+        "executor \"{executor}\" runs by the deadline of {agent}, and has no room for {other}"
+    ))
+    .help("give each an executor of its own")
+}
+
+/// All reasons in one.
+fn all(refusals: Vec<Refusal>) -> Refusal {
+    let mut refusals = refusals.into_iter();
+    let mut refusal = refusals.next().unwrap_or_else(|| Refusal::new("it cannot be"));
+    for more in refusals {
+        refusal.what = format!("{}; {}", refusal.what, more.what);
+    }
+    refusal
+}
+
 fn first(mistakes: Vec<types::value::Mistake>) -> Refusal {
     let mut mistakes = mistakes.into_iter();
     let mut refusal = mistakes.next().map_or_else(|| Refusal::new("the parameters are wrong"), Refusal::from);
@@ -487,5 +519,7 @@ pub(crate) fn timing_of(plan: &AgentPlan) -> Result<Timing, Refusal> {
         )));
     }
     let hang_after = plan.hang_after.unwrap_or((deadline * 4).max(LEAST_HANG));
-    Ok(Timing { period, deadline, min_gap: plan.min_gap, hang_after })
+    let mut timing = Timing { period, deadline, min_gap: plan.min_gap, hang_after, budget: None };
+    timing.budget = budget_of(plan, &timing).ok();
+    Ok(timing)
 }

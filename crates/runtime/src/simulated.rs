@@ -5,6 +5,7 @@
 
 mod busy;
 
+use core::cmp::Reverse;
 use core::sync::atomic::{AtomicBool, Ordering};
 use std::sync::Arc;
 use std::sync::mpsc::{Receiver, sync_channel};
@@ -123,6 +124,13 @@ struct Player {
     decided: Time,
 }
 
+/// The place of an executor: the highest first, and of those by deadline the one whose agent has the shorter one, which at one instant is the earlier.
+fn place_of(router: &Router, cores: &[Core], at: usize) -> (Reverse<u8>, Duration) {
+    let plan = &router.executors[at].plan;
+    let budget = cores[at].budget().filter(|_| plan.is_by_deadline());
+    (Reverse(plan.level().unwrap_or(0)), budget.map_or(Duration::ZERO, |budget| budget.deadline))
+}
+
 fn play(simulation: Simulation) -> Result<Report, CannotRun> {
     let Simulation { built, control, asks, options, timed } = simulation;
     // The run's own end of the way to ask would keep it from ever being closed.
@@ -133,7 +141,7 @@ fn play(simulation: Simulation) -> Result<Report, CannotRun> {
     let log_shared = router.log_shared.clone();
     let log = LogThread::start(log_shared, vec![reader], recorder, directory.clone())?;
     let mut order: Vec<usize> = (0..cores.len()).collect();
-    order.sort_by_key(|at| core::cmp::Reverse(router.executors[*at].plan.priority.map_or(0, i32::from)));
+    order.sort_by_key(|at| place_of(&router, &cores, *at));
     let context = Context::new(Some(writer), directory);
     let blocked = vec![Time::ZERO; cores.len()];
     let mut player = Player {
@@ -345,7 +353,10 @@ impl Player {
 
     fn apply(&mut self, request: Request) -> Result<(), Refusal> {
         let mut fabric = Still { cores: &mut self.cores, context: &self.context, now: self.now };
-        self.router.apply(request, self.now, &mut fabric)
+        let done = self.router.apply(request, self.now, &mut fabric);
+        // Deadlines may be others now.
+        self.order.sort_by_key(|at| place_of(&self.router, &self.cores, *at));
+        done
     }
 
     fn supervise(&mut self) -> Time {

@@ -40,8 +40,10 @@ pub struct Timetable {
 /// messages out of a queue may have to take all of them.
 pub fn timetable(plan: &Plan, registry: &Registry, assumed: &Assumed<'_>) -> Timetable {
     let executors = executors_of(plan);
+    // Those by deadline stand above all others, on one level: each is taken to wait for all the rest, which it does at worst, whoever of them
+    // has the earliest deadline. In the order of their deadlines the sum were less, and too little.
     let threads = executors.iter().map(|executor| Executor {
-        priority: executor.priority,
+        priority: executor.level(),
         may: executor.cpus.iter().fold(0, |mask, cpu| mask | Mask::from(1u8) << (cpu & 63)),
     });
     let threads =

@@ -6,6 +6,7 @@
 
 #![allow(unsafe_code)]
 
+mod budget;
 mod threads;
 mod watchdog;
 
@@ -17,6 +18,7 @@ use std::time::Duration as HostDuration;
 
 use types::{Duration, Time};
 
+use self::budget::{Asked, standing, told};
 use self::threads::Threads;
 use self::watchdog::watch;
 use crate::agent::Registry;
@@ -87,6 +89,9 @@ struct Cell {
     /// Whether the spare thread has been used up, and another is to be made.
     needs_spare: AtomicBool,
     granted: Mutex<Option<String>>,
+    /// Whether its thread has asked for another budget since anybody looked, and the number of the error with which it was refused, or zero.
+    has_asked: AtomicBool,
+    refused: AtomicI32,
     stop: AtomicBool,
 }
 
@@ -183,7 +188,7 @@ impl Runner {
             router.log_shared.note(clock.now(), "sinew", &what);
         }
         let wants_real_time =
-            router.executors.iter().any(|executor| executor.plan.priority.is_some() && executor.is_used());
+            router.executors.iter().any(|executor| executor.plan.level().is_some() && executor.is_used());
         if wants_real_time && let Err(error) = os::lock_memory() {
             let what = format!("memory is not locked: {error}; page faults can make steps late");
             router.log_shared.note(clock.now(), "sinew", &what);
@@ -197,7 +202,7 @@ impl Runner {
         }
         let log =
             LogThread::start(router.log_shared.clone(), readers, options.recorder.take(), directory.clone())?;
-        let witness = Arc::new(Witness::new());
+        let witness = Arc::new(Witness::new(cores.len()));
         let mut runner = Runner {
             cells: Vec::new(),
             threads: Vec::new(),
@@ -248,6 +253,8 @@ impl Runner {
             call: Futex::new(NOBODY),
             needs_spare: AtomicBool::new(false),
             granted: Mutex::new(None),
+            has_asked: AtomicBool::new(false),
+            refused: AtomicI32::new(0),
             stop: AtomicBool::new(false),
             core: UnsafeCell::new(core),
         });
@@ -324,6 +331,8 @@ impl Runner {
             }
         };
         let now = self.clock.now();
+        // While there are threads that can be asked.
+        self.note_grants();
         self.end();
         // A short run may be over before anybody has looked at what its threads were granted.
         self.note_grants();
@@ -385,6 +394,9 @@ impl Runner {
     fn note_grants(&mut self) {
         for (cell, known) in self.cells.iter().zip(&mut self.router.executors) {
             if let Some(granted) = cell.granted.lock().unwrap_or_else(PoisonError::into_inner).take() {
+                known.granted = granted;
+            }
+            if let Some(granted) = cell.asked_meanwhile() {
                 known.granted = granted;
             }
         }
@@ -467,6 +479,9 @@ impl Runner {
     }
 }
 
+/// Of a spare thread whose executor runs by its agent's deadline: it asks for the budget, of which there is one, when it has the executor.
+const SPARE_PRIORITY: u8 = 93;
+
 /// What stands in the word on which a spare thread waits.
 const CALLED: u32 = 1;
 const STOPPED: u32 = 2;
@@ -482,7 +497,7 @@ fn thread_main(
 ) {
     os::touch_stack();
     os::exact_timers();
-    let granted = ask_for(plan);
+    let mut granted = Some(ask_for(plan));
     let context = Context::new(log, directory);
     let _entered = context.enter();
     // A spare thread sleeps here until the core is its own.
@@ -507,11 +522,22 @@ fn thread_main(
         cell.call.wait(cell.call.word.load(Ordering::Acquire) & !CALLED, None);
     }
     cell.thread.store(os::thread_id(), Ordering::Release);
-    *cell.granted.lock().unwrap_or_else(PoisonError::into_inner) = Some(granted);
-    let (policy, priority) = os::granted();
-    let level = if policy == libc::SCHED_FIFO { u64::try_from(priority).unwrap_or(0) } else { 0 };
-    let watch = Stopwatch::new(witness, processors, level, &plan.cpus, clock.offset);
-    run_core(cell, number, plan, clock, &context, &watch);
+    // SAFETY: the core is this thread's own, and the borrow ends here.
+    let (executor, needed) = unsafe { ((*cell.core.get()).number, (*cell.core.get()).budget()) };
+    let watch = Stopwatch::new(witness, processors, executor as usize, &plan.cpus, clock.offset);
+    let mut asked = Asked::default();
+    if plan.is_by_deadline() {
+        if needed.is_none() {
+            // A spare one, perhaps, whose agent has left meanwhile.
+            let _ = os::set_ordinary();
+        }
+        granted = asked.ask(needed, clock.now()).map(|said| told(&said));
+    }
+    if granted.is_some() {
+        *cell.granted.lock().unwrap_or_else(PoisonError::into_inner) = granted;
+    }
+    watch.stands_at(standing());
+    run_core(cell, number, plan, clock, &context, &watch, asked);
 }
 
 /// Asks for what the plan says, and tells what was granted.
@@ -521,6 +547,10 @@ fn ask_for(plan: &ExecutorPlan) -> String {
         && let Err(error) = os::set_affinity(&plan.cpus)
     {
         told = format!(", not on processors {:?}: {error}", plan.cpus);
+    }
+    if plan.is_by_deadline() {
+        let _ = os::set_fifo(SPARE_PRIORITY);
+        return told;
     }
     match plan.priority.map(os::set_fifo) {
         None => format!("ordinary{told}"),
@@ -543,10 +573,11 @@ fn run_core(
     clock: WallClock,
     context: &Context,
     watch: &Stopwatch<'_>,
+    mut asked: Asked,
 ) {
     let core = cell.core.get();
     let mut woken = watch.wake();
-    let here = RealTime::enter(plan.priority.is_some());
+    let here = RealTime::enter(plan.level().is_some());
     let mut sleep = |until| {
         watch.rest(&woken);
         here.pause(|| cell.door.sleep(until));
@@ -563,6 +594,14 @@ fn run_core(
         }
         if changes || watch.is_old(&at) {
             at = watch.fresh(at.time);
+        }
+        if plan.is_by_deadline() && (changes || asked.is_due(at.time)) {
+            // SAFETY: as above, and the borrow ends here.
+            let needed = unsafe { (*core).budget() };
+            if let Some(said) = asked.ask(needed, at.time) {
+                cell.note_asked(&said);
+                watch.stands_at(standing());
+            }
         }
         // SAFETY: as above, and the borrow ends before the step.
         let job = unsafe { (*core).next(at.time) };

@@ -15,7 +15,7 @@ pub(super) struct Row {
     /// Nothing for an agent that nothing makes run.
     pub period: Option<Exact>,
     pub deadline: Exact,
-    /// For people: `fifo 70`, or the rank among the tasks, 1 for the highest.
+    /// For people: `fifo 70`, 100 for one by its deadline, or the rank among the tasks, 1 for the highest.
     pub priority: Option<u32>,
     pub processor: Option<usize>,
     /// Nothing where the deadline is missed, or nothing is promised.

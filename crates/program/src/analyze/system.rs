@@ -4,7 +4,8 @@ use std::collections::BTreeMap;
 use std::path::Path;
 
 use runtime::{
-    AgentPlan, Assumed, CannotRun, Options, Registry, Simulation, Timetable, owner, timetable, wires_of,
+    AgentPlan, Assumed, CannotRun, ExecutorPlan, Options, Registry, Simulation, Timetable, owner, timetable,
+    wires_of,
 };
 use schedule::sensitivity::largest;
 use schedule::system::{Found, Source, System, Unsound};
@@ -187,7 +188,7 @@ fn rows(ready: &Ready, table: &Timetable, found: &[Found]) -> Vec<Row> {
             cost: agent.cost,
             period: found.streams.iter().map(|stream| stream.period).min(),
             deadline: agent.deadline,
-            priority: executor.priority.map(u32::from),
+            priority: executor.level().map(u32::from),
             processor: None,
             response: found.response.filter(|_| found.meets),
             counts,
@@ -195,13 +196,19 @@ fn rows(ready: &Ready, table: &Timetable, found: &[Found]) -> Vec<Row> {
             measured: None,
             least_period,
             cost_factor: factor,
-            remark: match (&executor.name, waits_for.as_slice()) {
-                (executor, []) => executor.clone(),
+            remark: match (under(executor), waits_for.as_slice()) {
+                (executor, []) => executor,
                 (executor, names) => format!("{executor}, on {}", names.join(" ")),
             },
         }
     };
     agents.map(row).collect()
+}
+
+/// An executor's name, and whether it runs by its agent's deadline.
+fn under(executor: &ExecutorPlan) -> String {
+    let policy = if executor.is_by_deadline() { ", by deadline" } else { "" };
+    format!("{}{policy}", executor.name)
 }
 
 /// Executors that may keep each other waiting are analysed as if they shared one processor.

@@ -2,7 +2,9 @@
 
 use std::path::{Path, PathBuf};
 
-use runtime::{AgentPlan, Assumed, ExecutorPlan, Plan, Registry, timetable};
+use runtime::{
+    AgentPlan, Assumed, ExecutorPlan, Plan, Policy, Registry, not_by_deadline, timetable,
+};
 use sim::{Goal, Model, Vary, WorldPlan};
 use types::Duration;
 use types::value::{Entry, Mistake, Span, Table, TableReader, Value, nearest};
@@ -250,7 +252,9 @@ impl<'r> Reader<'r> {
     pub(super) fn executors(&mut self, tree: &Table) {
         for (name, at, table) in self.each(tree, "executor") {
             let mut r = TableReader::new(table, at, format!("executor \"{name}\""));
+            let before = self.mistakes.len();
             let mut executor = ExecutorPlan { at, ..ExecutorPlan::new(name, None) };
+            executor.policy = policy(&mut r, name);
             if let Some(n) = r.int("priority") {
                 match u8::try_from(n).ok().filter(|n| (1..=94).contains(n)) {
                     Some(n) => executor.priority = Some(n),
@@ -274,6 +278,9 @@ impl<'r> Reader<'r> {
             }
             executor.spin = span_of_time(&mut r, "spin").unwrap_or(Duration::ZERO);
             r.finish(&mut self.mistakes);
+            if self.mistakes.len() > before {
+                self.spoiled.push(at);
+            }
             self.plan.executors.push(executor);
         }
     }
@@ -405,6 +412,34 @@ impl<'r> Reader<'r> {
 
     pub(super) fn say(&mut self, at: Span, what: String) {
         self.mistakes.push(Mistake::new(at, what));
+    }
+}
+
+/// The policy of an executor, and whether what else is written of it goes with that.
+fn policy(r: &mut TableReader<'_>, name: &str) -> Policy {
+    let Some(word) = r.text("policy") else { return Policy::default() };
+    match Policy::ALL.into_iter().find(|policy| policy.name() == word) {
+        Some(Policy::Deadline) => {
+            for entry in ["priority", "cpus", "spin"] {
+                if r.entry(entry).is_some() {
+                    r.report(not_by_deadline(name, entry, r.place(entry)));
+                }
+            }
+            Policy::Deadline
+        }
+        Some(Policy::Fifo) => {
+            if r.entry("priority").is_none() {
+                let what = format!("executor \"{name}\" has no priority under policy \"fifo\"");
+                let help = "write priority = 60, say, or no policy for an ordinary thread";
+                r.report(Mistake::new(r.place("policy"), what).help(help));
+            }
+            Policy::Fifo
+        }
+        None => {
+            let what = format!("there is no policy \"{word}\"");
+            r.report(unknown(r.place("policy"), what, word, Policy::ALL.map(Policy::name)));
+            Policy::default()
+        }
     }
 }
 

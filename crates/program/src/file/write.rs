@@ -2,7 +2,9 @@
 
 use std::fmt::{self, Write as _};
 
-use runtime::{AgentPlan, ExecutorPlan, OnDeath, Plan, QueuePlan, TimedRequest, WireFilter, WirePlan};
+use runtime::{
+    AgentPlan, ExecutorPlan, OnDeath, Plan, Policy, QueuePlan, TimedRequest, WireFilter, WirePlan,
+};
 use types::Duration;
 use types::value::{Entry, Key, Table, Value};
 
@@ -105,6 +107,9 @@ fn span(key: &str, span: Option<Duration>, out: &mut String) -> fmt::Result {
 
 fn executor(executor: &ExecutorPlan, out: &mut String) -> fmt::Result {
     writeln!(out, "\n[executor.{}]", Key(&executor.name))?;
+    if executor.policy != Policy::default() {
+        writeln!(out, "policy = {}", Value::from(executor.policy.name()))?;
+    }
     if let Some(priority) = executor.priority {
         writeln!(out, "priority = {priority}")?;
     }

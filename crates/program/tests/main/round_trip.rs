@@ -158,14 +158,16 @@ fn times() -> impl Strategy<Value = Duration> {
 }
 
 fn executors() -> impl Strategy<Value = Vec<ExecutorPlan>> {
-    let one = (proptest::option::of(1u8..95), proptest::collection::vec(0usize..64, 0..3), 0i64..1_000_000);
+    let by_priority =
+        (proptest::option::of(1u8..95), proptest::collection::vec(0usize..64, 0..3), 0i64..1_000_000);
+    let one = proptest::option::weighted(0.7, by_priority);
     proptest::collection::vec(one, 0..3).prop_map(|all| {
         let named = all.into_iter().enumerate();
         named
-            .map(|(i, (priority, cpus, spin))| ExecutorPlan {
-                cpus,
-                spin: Duration(spin),
-                ..ExecutorPlan::new(["reflex", "own one", "x.y"][i], priority)
+            .map(|(i, one)| {
+                let name = ["reflex", "own one", "x.y"][i];
+                let Some((priority, cpus, spin)) = one else { return ExecutorPlan::by_deadline(name) };
+                ExecutorPlan { cpus, spin: Duration(spin), ..ExecutorPlan::new(name, priority) }
             })
             .collect()
     })

@@ -41,6 +41,7 @@ fn it_sees_what_can_be_seen_without_reading_on() {
         ("unknown_inputs", true),
         ("unknown_sections", true),
         ("never_runs", true),
+        ("by_deadline", true),
         // What other files say is not in the schema.
         ("wires_that_do_not_fit", true),
         ("wire_filters", true),

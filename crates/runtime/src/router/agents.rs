@@ -33,6 +33,7 @@ impl Router {
         let mut body = kind.build(&plan.params).map_err(first)?;
         let timing = timing_of(&plan)?;
         let executor = self.executor_for(&plan, timing)?;
+        self.check_budget(&plan, &timing, executor)?;
         let ends = new_ends(&plan, &kind, body.as_mut(), readers)?;
         let Some(id) = self.directory.give(&plan.name) else {
             return Err(Refusal::new("there are as many agents as there can be"));
@@ -326,6 +327,7 @@ impl Router {
             )));
         }
         let timing = timing_of(&plan)?;
+        self.check_budget(&plan, &timing, known.executor)?;
         let change = Change::Timing { slot: known.slot, timing };
         staged.step(Step { executor: known.executor, of: id, ring: None, what: What::Change(change) });
         self.alter(id, staged, move |known| (known.plan, known.timing) = (plan, timing));

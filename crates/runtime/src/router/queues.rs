@@ -372,7 +372,7 @@ impl Router {
             let mut order = Vec::with_capacity(queue.receivers.len());
             for wire in &queue.receivers {
                 let Some(known) = self.by_id(wire.to.0) else { continue };
-                let usual = self.executors[known.executor].plan.priority.unwrap_or(0);
+                let usual = self.executors[known.executor].plan.usual_serving();
                 let flow =
                     flows.entry(known.executor).or_insert_with(|| self.data_flow_order(known.executor));
                 let rank = flow.iter().position(|slot| *slot == known.slot);
@@ -660,7 +660,7 @@ impl Router {
     fn view_queue(&self, queue: &Queue) -> QueueView {
         let receivers = queue.receivers.iter().map(|wire| {
             let known = self.by_id(wire.to.0);
-            let usual = known.and_then(|known| self.executors[known.executor].plan.priority);
+            let usual = known.map(|known| self.executors[known.executor].plan.usual_serving());
             ReceiverView {
                 to: self.port_name(wire.to),
                 serving: wire.serving.or(usual).unwrap_or(0),

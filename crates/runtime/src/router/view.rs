@@ -6,7 +6,17 @@ use types::{Duration, Time};
 
 use super::{Known, Router, Wire};
 use crate::allocations;
+use crate::plan::ExecutorPlan;
 use crate::request::{AgentView, Counts, ExecutorView, PortView, SystemView, WireTotals, WireView};
+
+/// The scheduling that an executor asks for when it runs this agent.
+fn asked_for(executor: &ExecutorPlan, known: &Known) -> String {
+    match (known.timing.budget, executor.priority) {
+        (Some(budget), _) if executor.is_by_deadline() => budget.to_string(),
+        (_, Some(priority)) => format!("fifo {priority}"),
+        (_, None) => "ordinary".into(),
+    }
+}
 
 impl Router {
     /// What there is, as people ask for it.
@@ -15,7 +25,7 @@ impl Router {
         let wires = self.wires.values().filter(|wire| !wire.is_answer).map(|wire| self.view_wire(wire));
         let executors = self.executors.iter().map(|executor| ExecutorView {
             name: executor.plan.name.clone(),
-            real_time: executor.plan.priority.is_some(),
+            real_time: executor.plan.level().is_some(),
             allocations: executor.link.running.allocations.load(Relaxed),
         });
         SystemView {
@@ -48,7 +58,7 @@ impl Router {
             kind: known.kind.kind,
             doc: known.kind.doc,
             executor: executor.plan.name.clone(),
-            asked: executor.plan.priority.map_or("ordinary".into(), |priority| format!("fifo {priority}")),
+            asked: asked_for(&executor.plan, known),
             granted: executor.granted.clone(),
             state: known.state,
             last_death: known.last_death.clone(),

@@ -83,7 +83,7 @@ impl Player {
                 let _ = core.look_at_door();
                 core.note_ready(self.now);
                 if !busy.is_busy(at) && !core.is_idle(self.now) {
-                    let rank = -i128::from(self.router.executors[at].plan.priority.unwrap_or(0));
+                    let rank = self.rank(at);
                     busy.processors.submit(at, rank, 0);
                 }
             }
@@ -98,6 +98,18 @@ impl Player {
             }
         }
         Err(self.endless())
+    }
+
+    /// The smaller goes first: by deadline before all priorities, and among themselves by when they must be done. What their steps take
+    /// beyond their budget is not held back here.
+    fn rank(&self, executor: usize) -> i128 {
+        let plan = &self.router.executors[executor].plan;
+        match self.cores[executor].budget().filter(|_| plan.is_by_deadline()) {
+            Some(budget) => {
+                i128::from(i64::MIN) - i128::from(i64::MAX) + i128::from((self.now + budget.deadline).0)
+            }
+            None => -i128::from(plan.level().unwrap_or(0)),
+        }
     }
 
     fn begin(&mut self, busy: &mut Busy, at: usize) {

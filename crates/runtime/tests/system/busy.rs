@@ -79,6 +79,19 @@ fn a_higher_executor_takes_the_processor_away() {
     assert_eq!(of(&played(&plan, 2, 399), "low"), (16.0, 10, 0, 0));
 }
 
+/// By hand: from 0 the short one, then the long one from 4 to 10 and, as its deadline is the earlier one, on to 13. The long one of 16 waits for two
+/// of the others and ends at 30. At 47 the one with a priority has its first millisecond; the second is at 78, after the short one of 70.
+#[test]
+fn executors_by_deadline_go_before_all_and_the_earliest_deadline_first() {
+    let mut plan = Plan::new("edf");
+    on(&mut plan, "urgent", "gate", 100, 2);
+    on(&mut plan, "long", "control", 16, 9);
+    on(&mut plan, "short", "reflex", 10, 4);
+    plan.executors = ["control", "reflex"].map(runtime::ExecutorPlan::by_deadline).into();
+    let report = played(&plan, 1, 99);
+    assert_eq!(["short", "long", "urgent"].map(|name| of(&report, name).0), [8.0, 14.0, 79.0]);
+}
+
 /// By hand: each waits for the other's step that has begun: 10 + 3, and 3 + 10.
 #[test]
 fn agents_of_one_executor_do_not_interrupt_each_other() {
@@ -143,8 +156,13 @@ struct Drawn {
 
 fn drawn() -> impl Strategy<Value = Drawn> {
     let one = (1i64..=8, 1i64..=6, 0usize..4, proptest::option::of(0usize..5), 1u32..3);
-    (proptest::collection::vec(one, 1..=6), proptest::collection::vec(0usize..3, 4), 1usize..=2).prop_map(
-        |(agents, pins, processors)| {
+    (
+        proptest::collection::vec(one, 1..=6),
+        proptest::collection::vec(0usize..3, 4),
+        proptest::collection::vec(any::<bool>(), 6),
+        1usize..=2,
+    )
+        .prop_map(|(agents, pins, deadlines, processors)| {
             let names = ["receive", "reflex", "control", "vision"];
             let mut plan = Plan::new("drawn");
             plan.executors = runtime::executors_of(&plan);
@@ -164,9 +182,19 @@ fn drawn() -> impl Strategy<Value = Drawn> {
                     plan.wires.push(wire);
                 }
             }
+            // Some executors of one agent run by its deadline.
+            for (at, executor) in plan.executors.iter_mut().enumerate() {
+                let runs = |agent: &&AgentPlan| agent.executor.as_deref() == Some(&executor.name);
+                let mut agents = plan.agents.iter().filter(runs);
+                if let (Some(agent), None) = (agents.next(), agents.next())
+                    && deadlines[at % deadlines.len()]
+                    && agent.on.is_empty()
+                {
+                    *executor = runtime::ExecutorPlan::by_deadline(&executor.name);
+                }
+            }
             Drawn { plan, processors }
-        },
-    )
+        })
 }
 
 proptest! {

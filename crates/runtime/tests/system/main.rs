@@ -9,6 +9,7 @@ mod blocking;
 mod busy;
 mod calls;
 mod cuts;
+mod deadline;
 mod deaths;
 mod filters;
 mod fire;
