@@ -18,6 +18,8 @@ const PROCESSORS: usize = 64;
 const PERIOD: i64 = 1_000_000;
 /// Later than this, and it was a stall (ns).
 const STALL: i64 = 500_000;
+/// The kernel looks at its tick whether a budget is used up, so a thread can have so much more (ns): the longest tick there is.
+const TICK: i64 = 10_000_000;
 
 #[derive(Debug)]
 struct Seen {
@@ -67,7 +69,8 @@ impl Witness {
 
     /// What those above can have taken of a processor since `before`, which becomes the present (ns).
     fn taken(&self, cpu: usize, before: &mut i64) -> i64 {
-        let at_work: i64 = self.at_work.iter().map(|budget| budget.load(Ordering::Acquire)).sum();
+        let budgets = self.at_work.iter().map(|budget| budget.load(Ordering::Acquire));
+        let at_work: i64 = budgets.filter(|budget| *budget > 0).map(|budget| budget + TICK).sum();
         let above = self.above.get(cpu).map_or(0, |above| above.load(Ordering::Relaxed));
         at_work + above - core::mem::replace(before, above)
     }
@@ -119,9 +122,9 @@ mod tests {
         let witness = Witness::new(2);
         let mut before = 0;
         assert_eq!(witness.taken(0, &mut before), 0);
-        // At work, or held back in the middle of it: up to its budget. Then what it used, once, and only where it was.
+        // At work, or held back in the middle of it: up to its budget and a tick. Then what it used, once, and only where it was.
         witness.works(1, Duration::millis(2));
-        assert_eq!(witness.taken(0, &mut before), 2_000_000);
+        assert_eq!(witness.taken(0, &mut before), 2_000_000 + TICK);
         witness.rests(1, [Some(0), None], Duration::micros(1500));
         let mut other = 0;
         assert_eq!((witness.taken(0, &mut before), witness.taken(3, &mut other)), (1_500_000, 0));
