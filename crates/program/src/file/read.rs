@@ -2,9 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use runtime::{
-    AgentPlan, Assumed, ExecutorPlan, Plan, Policy, Registry, not_by_deadline, timetable,
-};
+use runtime::{AgentPlan, Assumed, ExecutorPlan, Plan, Policy, Registry, not_by_deadline, timetable};
 use sim::{Goal, Model, Vary, WorldPlan};
 use types::Duration;
 use types::value::{Entry, Mistake, Span, Table, TableReader, Value, nearest};
