@@ -511,6 +511,9 @@ pub(crate) fn timing_of(plan: &AgentPlan) -> Result<Timing, Refusal> {
         return Err(Refusal::new(format!("{name} would never run"))
             .help("give it a period, or name the inputs it is on"));
     }
+    if let Some(cost) = plan.cost.filter(|cost| *cost < Duration::ZERO) {
+        return Err(Refusal::new(format!("the cost of {name} is {cost}; no step gives time back")));
+    }
     let usual = plan.period.unwrap_or(DEADLINE_ON);
     let deadline = plan.deadline.unwrap_or(usual);
     if deadline <= Duration::ZERO || plan.period.is_some_and(|period| deadline > period) {

@@ -133,6 +133,13 @@ fn what_is_set_is_checked_and_what_is_forced_is_told() {
 }
 
 #[test]
+fn a_cost_below_nothing_is_refused() {
+    let said = said(&asked(&mut two(), 1, &["set high cost -1ms", "add third reflex 40 -1"]).unwrap());
+    assert!(said.iter().all(|said| said.contains("no step gives time back")), "{said:?}");
+    assert_eq!(said.len(), 2);
+}
+
+#[test]
 fn a_plan_that_does_not_fit_does_not_begin() {
     let mut plan = two();
     plan.agents.push(idle("third", "receive", 9, 4));
