@@ -138,6 +138,6 @@ pub use simulated::Simulation;
 pub use stats::{AgentStats, Figure, Histogram};
 pub use system::{CannotRun, Control, NoObserver, Observer, Options, Report, Verdict};
 pub use tap::{Heard, Tap};
-pub use timetable::{Assumed, Timetable, timetable};
+pub use timetable::{Assumed, Timetable, timetable, why_unsound};
 pub use types::params::Params;
 pub use wall::Live;

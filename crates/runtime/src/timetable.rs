@@ -4,13 +4,14 @@ use std::collections::HashMap;
 
 use schedule::Exact;
 use schedule::processors::{ANYWHERE, Mask};
-use schedule::system::{Agent, Executor, Source, System};
+use schedule::system::{Agent, Executor, Source, System, Unsound};
 use types::Duration;
 
 use crate::agent::Registry;
 use crate::check::{executors_of, wires_of};
 use crate::plan::{AgentPlan, ExecutorPlan, Plan, USUAL_DEPTH_ON, WirePlan, owner};
 use crate::port::Direction;
+use crate::request::Refusal;
 use crate::router::{timing_of, usual_executor};
 
 /// What is not in a plan and must be known of it.
@@ -71,6 +72,19 @@ pub fn timetable(plan: &Plan, registry: &Registry, assumed: &Assumed<'_>) -> Tim
     let system =
         System { processors: assumed.processors, agents: agents.collect(), executors: threads.collect() };
     Timetable { system, executors }
+}
+
+/// Why a system of agents with these names cannot be analysed, in words.
+pub fn why_unsound(unsound: &Unsound, names: &[String]) -> Refusal {
+    match unsound {
+        Unsound::Circle(circle) => {
+            let around = circle.iter().chain(circle.first()).map(|at| names[*at].as_str());
+            let around: Vec<&str> = around.collect();
+            Refusal::new(format!("agents make each other run in a circle: {}", around.join(" → ")))
+                .help("one of them should have a period, and not be on what the one before it sends")
+        }
+        Unsound::TooFine => Refusal::new(unsound.to_string()),
+    }
 }
 
 fn exact(span: Duration) -> Exact {

@@ -5,10 +5,10 @@ use std::path::Path;
 
 use runtime::{
     AgentPlan, Assumed, CannotRun, ExecutorPlan, Options, Registry, Simulation, Timetable, owner, timetable,
-    wires_of,
+    why_unsound, wires_of,
 };
 use schedule::sensitivity::largest;
-use schedule::system::{Found, Source, System, Unsound};
+use schedule::system::{Found, Source, System};
 use schedule::{Exact, Task, TaskSet};
 use serde_json::Value as Json;
 use types::Duration;
@@ -85,7 +85,10 @@ fn report(ready: &Ready, measured: Option<Measured>, processors: usize) -> Resul
         &ready.registry,
         &Assumed { cost: &cost, processors, overhead: Duration::ZERO, pace: &pace },
     );
-    let found = table.system.analyse().map_err(|unsound| unsound_failure(&unsound, ready))?;
+    let found = table.system.analyse().map_err(|unsound| {
+        let names: Vec<String> = plan.agents.iter().map(|agent| agent.name.clone()).collect();
+        Failure::from(why_unsound(&unsound, &names)).code(1)
+    })?;
     let mut report = Report { name: plan.name.clone(), ..Report::default() };
     report.rows = rows(ready, &table, &found);
     report.parts = parts(&table, &found);
@@ -120,20 +123,6 @@ fn report(ready: &Ready, measured: Option<Measured>, processors: usize) -> Resul
         }
     }
     Ok(report)
-}
-
-fn unsound_failure(unsound: &Unsound, ready: &Ready) -> Failure {
-    match unsound {
-        Unsound::Circle(circle) => {
-            let name = |at: &usize| ready.plan.agents[*at].name.as_str();
-            let mut names: Vec<&str> = circle.iter().map(name).collect();
-            names.extend(circle.first().map(name));
-            Failure::new(format!("agents make each other run in a circle: {}", names.join(" → ")))
-                .help("one of them should have a period, and not be on what the one before it sends")
-        }
-        Unsound::TooFine => Failure::new(unsound.to_string()),
-    }
-    .code(1)
 }
 
 fn rows(ready: &Ready, table: &Timetable, found: &[Found]) -> Vec<Row> {

@@ -2,7 +2,11 @@
 
 use std::path::{Path, PathBuf};
 
-use runtime::{AgentPlan, Assumed, ExecutorPlan, Plan, Policy, Registry, not_by_deadline, timetable};
+use runtime::{
+    AgentPlan, Assumed, ExecutorPlan, Plan, Policy, Refusal, Registry, not_by_deadline, timetable,
+    why_unsound,
+};
+use schedule::system::Unsound;
 use sim::{Goal, Model, Vary, WorldPlan};
 use types::Duration;
 use types::value::{Entry, Mistake, Span, Table, TableReader, Value, nearest};
@@ -194,14 +198,13 @@ impl<'r> Reader<'r> {
         let assumed =
             Assumed { cost: &|_| Duration::ZERO, processors: 1, overhead: Duration::ZERO, pace: &pace };
         let table = timetable(&self.plan, self.registry, &assumed);
-        if let Err(schedule::system::Unsound::Circle(circle)) = table.system.analyse() {
-            let agents: Vec<&AgentPlan> = circle.iter().map(|at| &self.plan.agents[*at]).collect();
-            let mut names: Vec<&str> = agents.iter().map(|agent| agent.name.as_str()).collect();
-            names.extend(names.first().copied());
-            let what = format!("agents make each other run in a circle: {}", names.join(" → "));
-            let at = agents.iter().map(|agent| agent.at).min_by_key(|at| at.start).unwrap_or_default();
-            let help = "one of them should have a period, and not be on what the one before it sends";
-            self.mistakes.push(Mistake::new(at, what).help(help));
+        if let Err(unsound) = table.system.analyse() {
+            let names: Vec<String> = self.plan.agents.iter().map(|agent| agent.name.clone()).collect();
+            let Refusal { what, help } = why_unsound(&unsound, &names);
+            let agents: &[usize] = if let Unsound::Circle(circle) = &unsound { circle } else { &[] };
+            let places = agents.iter().map(|at| self.plan.agents[*at].at);
+            let at = places.min_by_key(|at| at.start).unwrap_or_default();
+            self.mistakes.push(Mistake { at, what, help });
         }
     }
 

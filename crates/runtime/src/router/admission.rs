@@ -4,13 +4,13 @@ use std::collections::HashMap;
 
 use schedule::Exact;
 use schedule::sensitivity::largest;
-use schedule::system::{Found, Source, System, Unsound};
+use schedule::system::{Found, Source, System};
 use types::Duration;
 
 use super::{Incident, Reply, Router};
 use crate::plan::{AgentPlan, Plan};
 use crate::request::{Refusal, Request};
-use crate::timetable::{Assumed, timetable};
+use crate::timetable::{Assumed, timetable, why_unsound};
 
 /// What admission counts with.
 #[derive(Clone, Debug, Default)]
@@ -121,7 +121,7 @@ impl Router {
         )
         .system;
         let names: Vec<String> = plan.agents.into_iter().map(|agent| agent.name).collect();
-        let found = system.analyse().map_err(|unsound| unsound_refusal(&unsound, &names))?;
+        let found = system.analyse().map_err(|unsound| why_unsound(&unsound, &names))?;
         Ok(Some(Judged { names, system, found }))
     }
 
@@ -182,19 +182,6 @@ impl Router {
 
 fn as_millis(span: Duration) -> f64 {
     span.0 as f64 * 1e-6
-}
-
-/// Agents that make each other run in a circle, and whatever else cannot be analysed.
-fn unsound_refusal(unsound: &Unsound, names: &[String]) -> Refusal {
-    match unsound {
-        Unsound::Circle(circle) => {
-            let mut around: Vec<&str> = circle.iter().map(|at| names[*at].as_str()).collect();
-            around.extend(circle.first().map(|at| names[*at].as_str()));
-            Refusal::new(format!("agents make each other run in a circle: {}", around.join(" → ")))
-                .help("one of them should have a period, and not be on what the one before it sends")
-        }
-        Unsound::TooFine => Refusal::new(unsound.to_string()),
-    }
 }
 
 /// The agent whose timing a request changes, where it does.
