@@ -38,7 +38,8 @@ pub struct Timetable {
 /// A plan without mistakes as the analysis sees it.
 ///
 /// An agent that calls a service runs once more for each answer, and answers are no more than its other steps: these count twice. Whoever takes
-/// messages out of a queue may have to take all of them.
+/// messages out of a queue may have to take all of them. Steps that an agent asks for itself ([`Step::wake_at`](crate::Step::wake_at)) are not
+/// counted: nobody knows beforehand how many there will be.
 pub fn timetable(plan: &Plan, registry: &Registry, assumed: &Assumed<'_>) -> Timetable {
     let executors = executors_of(plan);
     // Those by deadline stand above all others, on one level: each is taken to wait for all the rest, which it does at worst, whoever of them
