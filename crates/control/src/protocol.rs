@@ -131,6 +131,7 @@ pub(crate) fn message_event(
         "deadline_ns": (header.deadline != Time::NEVER).then_some(header.deadline.0),
         "sender": agent(header.sender), "recipient": agent(header.recipient), "marker": header.marker,
         "category": header.category.name(), "priority": header.priority.name(),
+        "quality": header.quality.share(),
     });
     let unreadable = |what: &str| json!({"unreadable": what, "bytes": heard.cdr.len()});
     let event = |message: Json| {

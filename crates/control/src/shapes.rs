@@ -3,9 +3,9 @@
 //! | shape | keys |
 //! |---|---|
 //! | `ls` | `system`, `time_s`, `agents`: rows of `name`, `kind`, `state` (`running`, `restarting`, `dead`), `executor`, `asked`, `granted`, `period_s` (null without one), `deadline_s`, the counts, `last_death` (null when it never died), `params`; `queues` |
-//! | `graph` | `system`, `time_s`, `agents`: rows of `name`, `kind`, `doc`, `executor`, `ports`: rows of `name`, `doc`, `direction` (`input`, `output`, `service`, `client`, `router`), `message`, `sent`, where it is `router` `asked`, `not_asked`; `wires`: rows of `from`, `to`, `message`, `depth`, `overload`, `filter`, `sent`, `taken`, `dropped`, `refused`, `expired`; `queues` |
+//! | `graph` | `system`, `time_s`, `agents`: rows of `name`, `kind`, `doc`, `executor`, `ports`: rows of `name`, `doc`, `direction` (`input`, `output`, `service`, `client`, `router`, `manager`), `message`, `sent`, where it is `router` `asked`, `not_asked`; `wires`: rows of `from`, `to`, `message`, `depth`, `overload`, `filter`, `sent`, `taken`, `dropped`, `refused`, `expired`; `queues` |
 //! | `top` | `system`, `time_s`, `messages`: `sent`, `taken`, `dropped`, `refused`, `expired` over all wires; `agents`: rows of `name`, `state`, `executor`, `asked`, `granted`, the counts, and the figures `exec`, `jitter`, `response` |
-//! | counts | `releases`, `missed`, `stalled`, `skipped`, `faults`, `panics`, `hangs`, `restarts`; of execution times `left_out` (a stall was in the step), `checked` (held against the clock of the thread) and `disagreed`; `allocations` (how often steps took or freed memory, where the program watches that) |
+//! | counts | `releases`, `missed`, `stalled`, `skipped`, `faults`, `panics`, `hangs`, `restarts`, `refinements`, `overruns` (of the budget for refinements); how it does its step at the moment: `method` and `budget_s` (null without), `suspended`; of execution times `left_out` (a stall was in the step), `checked` (held against the clock of the thread) and `disagreed`; `allocations` (how often steps took or freed memory, where the program watches that) |
 //! | figure | `name`, `unit`, `n`, `min`, `p50`, `p99`, `p999`, `max`: unfiltered; all values null while `n` is 0 |
 //! | `queues` | rows of `name`, `message` (null before anybody is wired to it), `depth`, `overload`, `waiting`, `sent`, `dropped`, `refused`, `taken`, `receivers`: rows of `to`, `serving`, `taken`; what was sent and taken on wires that are gone counts too |
 //! | filter | `category` (null for all), `priority` (the least), `marker`, `recipient` (the name of an agent, null for all), `every` |
@@ -14,8 +14,8 @@
 //! not granted, dropped or missed is in these numbers.
 
 use runtime::{
-    AgentPlan, AgentView, Direction, Figure, PlanParts, PortView, QueuePlan, QueueView, Refusal, Request,
-    SystemView, WireFilter, WirePlan, WireView,
+    AgentPlan, AgentView, Figure, PlanParts, PortView, QueuePlan, QueueView, Refusal, Request, SystemView,
+    WireFilter, WirePlan, WireView,
 };
 use serde_json::{Map, Value as Json, json};
 use types::Duration;
@@ -103,6 +103,8 @@ fn with_counts(mut row: Json, agent: &AgentView) -> Json {
         ("panics", counts.panics),
         ("hangs", counts.hangs),
         ("restarts", counts.restarts),
+        ("refinements", counts.refinements),
+        ("overruns", counts.overruns),
         ("left_out", counts.left_out),
         ("checked", counts.checked),
         ("disagreed", counts.disagreed),
@@ -110,6 +112,9 @@ fn with_counts(mut row: Json, agent: &AgentView) -> Json {
     ] {
         row[key] = count.into();
     }
+    row["method"] = agent.method.into();
+    row["budget_s"] = agent.budget.map(Duration::seconds).into();
+    row["suspended"] = agent.is_suspended.into();
     row
 }
 
@@ -140,13 +145,7 @@ fn graph_agent(agent: &AgentView) -> Json {
 }
 
 fn graph_port(port: &PortView) -> Json {
-    let direction = match port.direction {
-        Direction::Input => "input",
-        Direction::Output => "output",
-        Direction::Service => "service",
-        Direction::Client => "client",
-        Direction::Router => "router",
-    };
+    let direction = port.direction.name();
     let mut row = json!({
         "name": port.name, "doc": port.doc, "direction": direction, "message": port.message, "sent": port.sent,
     });

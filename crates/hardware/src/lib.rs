@@ -42,6 +42,7 @@ pub mod description;
 pub mod driver;
 pub mod gate;
 pub mod guard;
+pub mod host;
 pub mod latch;
 mod lines;
 mod newest;

@@ -10,12 +10,15 @@ const PORTS: [&str; 4] = ["Input", "Output", "Service", "Client"];
 /// The end at the router, of which an agent has one at most. No wire leads to it, so it has no handle in a plan.
 const ROUTER: &str = "Router";
 
+/// The end at the resource side of the runtime, likewise.
+const MANAGER: &str = "Manager";
+
 /// `Input` and `[T]` of `Input<T>`; nothing for other types.
 fn port_type(ty: &Type) -> Option<(String, Vec<&Type>)> {
     let Type::Path(path) = ty else { return None };
     let last = path.path.segments.last()?;
     let name = last.ident.to_string();
-    if name == ROUTER && last.arguments.is_none() {
+    if (name == ROUTER || name == MANAGER) && last.arguments.is_none() {
         return Some((name, Vec::new()));
     }
     if !PORTS.contains(&name.as_str()) {
@@ -51,15 +54,43 @@ fn options(field: &Field, runtime: &proc_macro2::TokenStream) -> syn::Result<pro
     Ok(quote!(#runtime::PortOptions { #(#sets,)* ..#runtime::PortOptions::DEFAULT }))
 }
 
-/// One is enough, and it has nothing to be chosen.
-fn check_router(field: &Field, has_router: &mut bool) -> syn::Result<()> {
-    if core::mem::replace(has_router, true) {
-        return Err(syn::Error::new_spanned(field, "an agent has one `Router`"));
+/// One of a kind is enough, and it has nothing to be chosen.
+fn check_single(field: &Field, name: &str, known: &mut Vec<String>) -> syn::Result<()> {
+    if known.iter().any(|known| known == name) {
+        return Err(syn::Error::new_spanned(field, format!("an agent has one `{name}`")));
     }
+    known.push(name.to_owned());
     match field.attrs.iter().find(|a| a.path().is_ident("port") || a.path().is_ident("robot")) {
-        Some(attribute) => Err(syn::Error::new_spanned(attribute, "a `Router` has no options")),
+        Some(attribute) => Err(syn::Error::new_spanned(attribute, format!("a `{name}` has no options"))),
         None => Ok(()),
     }
+}
+
+/// The methods of an agent as rows of `runtime::Method`, from `methods(exact = 1.0, rough = 0.6)`.
+fn methods(
+    meta: &syn::meta::ParseNestedMeta<'_>,
+    runtime: &proc_macro2::TokenStream,
+) -> syn::Result<Vec<proc_macro2::TokenStream>> {
+    let content;
+    syn::parenthesized!(content in meta.input);
+    let mut rows = Vec::new();
+    while !content.is_empty() {
+        let name = if content.peek(LitStr) {
+            content.parse::<LitStr>()?.value()
+        } else {
+            content.parse::<syn::Ident>()?.to_string()
+        };
+        content.parse::<syn::Token![=]>()?;
+        let quality = content.parse::<syn::Lit>()?;
+        rows.push(quote!(#runtime::Method { name: #name, quality: #quality }));
+        if !content.is_empty() {
+            content.parse::<syn::Token![,]>()?;
+        }
+    }
+    if rows.is_empty() {
+        return Err(meta.error("an agent with `methods` has one at least, as in methods(exact = 1.0)"));
+    }
+    Ok(rows)
 }
 
 pub(crate) fn derive(input: DeriveInput) -> syn::Result<proc_macro2::TokenStream> {
@@ -67,20 +98,29 @@ pub(crate) fn derive(input: DeriveInput) -> syn::Result<proc_macro2::TokenStream
     let name = &input.ident;
     let visibility = &input.vis;
     let mut kind = kebab(&name.to_string());
+    let (mut ways, mut is_anytime) = (Vec::new(), false);
     for attribute in input.attrs.iter().filter(|a| a.path().is_ident("agent")) {
         attribute.parse_nested_meta(|meta| {
             if meta.path.is_ident("kind") {
                 kind = meta.value()?.parse::<LitStr>()?.value();
                 return Ok(());
             }
-            Err(meta.error("an agent has `kind`"))
+            if meta.path.is_ident("methods") {
+                ways = methods(&meta, &runtime)?;
+                return Ok(());
+            }
+            if meta.path.is_ident("anytime") {
+                is_anytime = true;
+                return Ok(());
+            }
+            Err(meta.error("an agent has `kind`, `methods` or `anytime`"))
         })?;
     }
     let description = doc(&input.attrs);
 
     let (mut builds, mut visits, mut handle_fields, mut handle_makes) = (vec![], vec![], vec![], vec![]);
     let mut params_type = None;
-    let mut has_router = false;
+    let mut singles = Vec::new();
     for field in named_fields(&input)? {
         let id = ident(field)?;
         let key = id.to_string();
@@ -92,15 +132,15 @@ pub(crate) fn derive(input: DeriveInput) -> syn::Result<proc_macro2::TokenStream
         builds.push(quote!(#id: ::core::default::Default::default()));
         let Some((port, types)) = port_type(&field.ty) else { continue };
         let about = doc(&field.attrs);
-        let is_router = port == ROUTER;
-        if is_router {
-            check_router(field, &mut has_router)?;
+        let is_single = port == ROUTER || port == MANAGER;
+        if is_single {
+            check_single(field, &port, &mut singles)?;
         }
         let options = options(field, &runtime)?;
         visits.push(quote! {
             visit(#runtime::PortVisit { name: #key, doc: #about, options: #options, port: &mut self.#id });
         });
-        if is_router {
+        if is_single {
             continue;
         }
         let end = format_ident!("{port}End");
@@ -125,6 +165,8 @@ pub(crate) fn derive(input: DeriveInput) -> syn::Result<proc_macro2::TokenStream
         impl #runtime::Declare for #name {
             const KIND: &'static str = #kind;
             const DOC: &'static str = #description;
+            const METHODS: &'static [#runtime::Method] = &[#(#ways),*];
+            const IS_ANYTIME: bool = #is_anytime;
             type Params = #params;
             type Ports = #handle;
 

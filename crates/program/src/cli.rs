@@ -49,6 +49,9 @@ enum Command {
     Doctor,
     /// Measures; "sinew bench list" says what.
     Bench(bench::BenchArgs),
+    /// Takes a share of a processor, as a process that has nothing to do with the run that it burdens.
+    #[command(hide = true)]
+    Burden(run::BurdenArgs),
 }
 
 /// What `sinew run` can be told.
@@ -225,6 +228,7 @@ fn done(command: Command, registry: Registry, json: bool) -> Result<ExitCode, Fa
         Command::Know(args) => know::know(&args, json),
         Command::New(command) => tools::make(&command, json),
         Command::Doctor => Ok(tools::examine(json)),
+        Command::Burden(args) => run::burden(&args),
         Command::Bench(args) => bench::bench(&args, &registry, json),
     }
 }

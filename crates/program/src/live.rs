@@ -58,7 +58,7 @@ pub(crate) enum LiveCommand {
     Wire(Words),
     /// Cuts a wire, when what is on it has arrived.
     Unwire(Words),
-    /// Sets parameters, or period, deadline, min_gap, cost: sinew set NAME KEY=VALUE…
+    /// Sets parameters, or period, deadline, min_gap, cost, method, budget, importance, suspended: sinew set NAME KEY=VALUE…
     Set(Words),
     /// The emergency stop: all robots stand until "sinew reset".
     Stop(Words),
@@ -84,7 +84,7 @@ pub(crate) enum LiveCommand {
     Call(Words),
     /// Sends a message out of a port: sinew send AGENT.PORT linear.x=0.2
     Send(Words),
-    /// Makes an agent or a sensor misbehave: off, stuck, garbage, wrong, slow, intermittent, panic, hang; ok ends it.
+    /// Makes an agent or a sensor misbehave: off, stuck, garbage, wrong, slow, heavy, delayed, intermittent, panic, hang; ok ends it.
     Fault(Words),
 }
 

@@ -16,10 +16,29 @@ pub fn schema(registry: &Registry) -> Json {
     let kinds = registry.types().iter().filter(|kind| kind.kind != "robot");
     let mut agents: Vec<Json> = kinds.map(agent).collect();
     agents.push(group());
-    let [name, world, robot_, executor_, agent_, queue_, wires_, decide_, goal_, vary_, at_] = SECTIONS;
+    let [
+        name,
+        world,
+        processors_,
+        robot_,
+        executor_,
+        agent_,
+        queue_,
+        wires_,
+        decide_,
+        goal_,
+        vary_,
+        burden_,
+        at_,
+    ] = SECTIONS;
     let properties = object([
         (name, json!({"type": "string", "description": "The name of the system."})),
         (world, world_()),
+        (
+            processors_,
+            json!({"type": "integer", "minimum": 1, "maximum": 64, "description":
+                "In simulated time, on how many virtual processors steps take the cost that they declare."}),
+        ),
         (robot_, named(robot(registry.get("robot")), "The robots.")),
         (executor_, named(executor(), "Threads besides the usual ones, or in their place.")),
         (agent_, named(json!({"anyOf": agents}), "The agents.")),
@@ -31,6 +50,7 @@ pub fn schema(registry: &Registry) -> Json {
             vary_,
             json!({"type": "object", "description": "What a seed draws: an entry and its distribution."}),
         ),
+        (burden_, named(burden(), "Work of other processes with a real-time priority.")),
         (at_, json!({"type": "array", "items": request(), "description": "Timed requests and faults."})),
     ]);
     json!({
@@ -90,6 +110,29 @@ fn choice<'a>(words: impl IntoIterator<Item = &'a str>, doc: &str) -> Json {
     json!({"enum": words.into_iter().collect::<Vec<_>>(), "description": doc})
 }
 
+fn burden() -> Json {
+    let cpus = json!({"type": "array", "items": {"type": "integer", "minimum": 0, "maximum": 63},
+        "description": "The processors on which it may run; all when nothing is said."});
+    let priority = json!({"type": "integer", "minimum": 1, "maximum": 94, "description": "Its priority."});
+    let rows = [
+        ("priority", priority),
+        ("share", range(0.0, 0.99, "How much of a processor it takes.")),
+        ("cpus", cpus),
+        ("period", time("The time between two pieces of its work; 10 ms when nothing is said.")),
+        ("from", time("When it begins, counted from the start.")),
+        ("until", time("When it ends.")),
+    ];
+    closed(rows, &["priority", "share"])
+}
+
+fn flag(doc: &str) -> Json {
+    json!({"type": "boolean", "description": doc})
+}
+
+fn range(least: f64, most: f64, doc: &str) -> Json {
+    json!({"type": "number", "minimum": least, "maximum": most, "description": doc})
+}
+
 /// Words that an editor offers where others are allowed too.
 fn open_choice<'a>(words: impl IntoIterator<Item = &'a str>, doc: &str) -> Json {
     json!({"anyOf": [{"enum": words.into_iter().collect::<Vec<_>>()}, {"type": "string"}], "description": doc})
@@ -130,9 +173,43 @@ fn agent(kind: &AgentType) -> Json {
         ),
         ("on_death", choice(["restart", "leave"], "What happens when it dies.")),
         ("hang_after", time("How long a step may last before it is taken for one that does not return.")),
+        (
+            "importance",
+            range(0.0, 1.0, "How important it is to a resource manager; 0.5 when nothing is said."),
+        ),
+        (
+            "elasticity",
+            range(0.0, 1e6, "How readily its period gives way, beside those of others; 0 for not at all."),
+        ),
+        (
+            "gap_max",
+            time("How far the least time between two steps that messages make it run may be lengthened."),
+        ),
+        ("may_suspend", flag("Whether it may be suspended, when nothing else is left.")),
+        ("rigid", flag("Whether a resource manager is not to touch it, whatever else is said.")),
+        ("suspended", flag("Whether it begins suspended: it makes no step.")),
     ];
+    let names = || kind.methods.iter().map(|method| method.name);
+    let methods = (!kind.methods.is_empty()).then(|| {
+        let costs = object(names().map(|name| (name, time("Processor time of a step by it at worst."))));
+        [
+            ("method", choice(names(), "How it does its step; the best when nothing is said.")),
+            (
+                "methods",
+                json!({"type": "object", "properties": costs, "additionalProperties": false,
+                "description": "Processor time of a step by each of its methods at worst."}),
+            ),
+        ]
+    });
+    let refines = kind.is_anytime.then(|| {
+        [
+            ("refinement", time("Processor time of one refinement at worst.")),
+            ("budget", time("How long a step may take with its refinements.")),
+        ]
+    });
+    let common = common.into_iter().chain(methods.into_iter().flatten()).chain(refines.into_iter().flatten());
     let params = kind.params.iter().map(|field| (field.name, parameter(field)));
-    let mut schema = closed(common.into_iter().chain(params), &["is"]);
+    let mut schema = closed(common.chain(params), &["is"]);
     schema["title"] = json!(kind.kind);
     schema["description"] = json!(format!("{} {}", kind.doc, ports(kind)));
     schema

@@ -9,6 +9,7 @@ use std::sync::{Arc, Mutex};
 
 use proptest::prelude::*;
 use record::log::{self, Cause, ChannelId, Clock, Reader, RunInfo, Severity, Sink, Writer};
+use types::header::Quality;
 use types::message::{Message, describe};
 use types::messages::{Battery, Gyro, Image, LaserScan, Odometry, Transforms, Twist};
 use types::value::Value;
@@ -98,6 +99,7 @@ fn header(i: u64, time: Time) -> Header {
         marker: i as u32,
         category: Category::ALL[i as usize % 5],
         priority: Priority::ALL[i as usize % 4],
+        quality: Quality(255 - i as u8),
     }
 }
 

@@ -10,6 +10,7 @@ use types::value::{Mistake, Table, Value};
 use types::{AgentId, Duration, Message, Time};
 
 use crate::fetch::Depth;
+use crate::means::{Method, Refining};
 use crate::port::{PortOptions, PortShape, PortVisit};
 
 pub use macros::Agent;
@@ -96,9 +97,57 @@ pub struct Step {
     pub agent: AgentId,
     /// The time between two steps; zero for an agent that only messages make run.
     pub period: Duration,
+    /// Which of its methods it shall use, as a place among them; 0 for the best, and where it has one alone.
+    pub method: usize,
+    pub(crate) refining: Refining,
 }
 
 impl Step {
+    /// Whether there is time for one more refinement: an anytime agent asks before each, after it has done what must be done.
+    ///
+    /// On the wall clock one is begun only where the longest so far would end within the step's budget and before its deadline. In simulated
+    /// time each takes the cost that the plan declares for it. An agent whose plan gives no budget may not refine.
+    ///
+    /// ```
+    /// # use runtime::{Agent, Fault, Output, Step};
+    /// # use types::messages::Twist;
+    /// /// Comes nearer to the root of two, as long as it may.
+    /// #[derive(Agent)]
+    /// #[agent(anytime)]
+    /// struct Root {
+    ///     /// The root, as a speed.
+    ///     out: Output<Twist>,
+    /// }
+    ///
+    /// impl Agent for Root {
+    ///     fn step(&mut self, step: &mut Step) -> Result<(), Fault> {
+    ///         let mut root = 1.0;
+    ///         while step.may_refine() {
+    ///             root = (root + 2.0 / root) / 2.0;
+    ///         }
+    ///         step.set_quality(1.0 - f64::abs(root * root - 2.0));
+    ///         self.out.send(Twist::new(root, 0.0));
+    ///         Ok(())
+    ///     }
+    /// }
+    /// ```
+    pub fn may_refine(&mut self) -> bool {
+        self.refining.may_go_on()
+    }
+
+    /// How many refinements this step was given.
+    pub fn refined(&self) -> u32 {
+        self.refining.count
+    }
+
+    /// Says how good the result is, from 0 to 1 for the best that the agent can do. What it sends after this in the step carries it
+    /// ([`Header::quality`](types::Header::quality)); else it carries that of the agent's method.
+    pub fn set_quality(&self, quality: f64) {
+        if let Some(context) = crate::context::current() {
+            context.set_quality(types::header::Quality::of(quality));
+        }
+    }
+
     /// Asks for one more step at `time`, besides those that are due anyway.
     pub fn wake_at(&mut self, time: Time) {
         if let Some(context) = crate::context::current() {
@@ -155,6 +204,10 @@ pub trait Declare: Agent + Sized {
     const KIND: &'static str;
     /// What the agent does, in a sentence.
     const DOC: &'static str;
+    /// The ways in which it can do its step, the best first; none where there is one alone.
+    const METHODS: &'static [Method] = &[];
+    /// Whether its step goes on refining its result while it may ([`Step::may_refine`]).
+    const IS_ANYTIME: bool = false;
     /// Its parameters.
     type Params: Params;
     /// Its ports in a plan.
@@ -255,6 +308,10 @@ pub struct AgentType {
     pub ports: Vec<PortInfo>,
     /// Its parameters.
     pub params: Fields,
+    /// The ways in which it can do its step, the best first; none where there is one alone.
+    pub methods: &'static [Method],
+    /// Whether its step refines its result while it may.
+    pub is_anytime: bool,
     build: std::sync::Arc<dyn Fn(&Table) -> BuildResult + Send + Sync>,
     read_params: fn(&Table) -> ReadResult,
 }
@@ -289,6 +346,8 @@ impl AgentType {
             doc: A::DOC,
             ports,
             params: A::Params::fields(),
+            methods: A::METHODS,
+            is_anytime: A::IS_ANYTIME,
             build: std::sync::Arc::new(move |table| Ok(Box::new(make(A::Params::read(table, A::KIND)?)))),
             read_params: read_params::<A>,
         }

@@ -66,7 +66,7 @@ pub(crate) fn budget_of(plan: &AgentPlan, timing: &Timing) -> Result<Budget, Vec
         )));
     }
     let steps = if is_periodic && runs_for_messages { 2 } else { 1 };
-    let Some(cost) = plan.cost else {
+    let Some(cost) = plan.cost_in_all(&[]) else {
         let what = format!("{name} has no cost, and under \"deadline\" it gets as much time as it says");
         against.push(Refusal::new(what).help("write cost = \"2ms\", say: what a step takes at worst"));
         return Err(against);

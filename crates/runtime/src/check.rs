@@ -5,8 +5,9 @@ use std::collections::HashMap;
 use types::Duration;
 use types::value::{Mistake, Span};
 
-use crate::agent::{AgentType, Registry};
+use crate::agent::{AgentType, PortInfo, Registry};
 use crate::budget::budget_of;
+use crate::means::Means;
 use crate::message_type::MessageType;
 use crate::plan::{AgentPlan, ExecutorPlan, Plan, WirePlan};
 use crate::port::Direction;
@@ -143,6 +144,9 @@ impl<'a> Checker<'a> {
                     ));
                 }
             }
+            if let Err(against) = Means::of(agent, kind) {
+                against.into_iter().for_each(|refusal| self.refuse(agent.at, refusal));
+            }
             let timing = match timing_of(agent) {
                 Ok(timing) => timing,
                 Err(refusal) => {
@@ -152,6 +156,17 @@ impl<'a> Checker<'a> {
             };
             let name = agent.executor.as_deref().unwrap_or(usual_executor(timing.deadline));
             let executor = executors.iter().find(|executor| executor.name == name);
+            let manages = |port: &PortInfo| port.shape.direction == Direction::Manager;
+            if let Some(executor) = executor.filter(|executor| executor.level().is_some())
+                && kind.ports.iter().any(manages)
+            {
+                let what = format!(
+                    "{} manages, and executor \"{}\" is in real time: managing takes memory and locks",
+                    agent.name, executor.name
+                );
+                let help = "write executor = \"ordinary\"";
+                self.mistakes.push(Mistake::new(agent.at, what).help(help));
+            }
             let Some(executor) = executor.filter(|executor| executor.is_by_deadline()) else { continue };
             match first.get(executor.name.as_str()) {
                 Some(other) => self.refuse(agent.at, has_its_agent(&executor.name, other, &agent.name)),

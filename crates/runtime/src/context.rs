@@ -7,6 +7,7 @@ use std::cell::{Cell, UnsafeCell};
 use std::ptr;
 use std::sync::Arc;
 
+use types::header::Quality;
 use types::{AgentId, Time};
 
 use crate::door::{Door, bit_of};
@@ -79,6 +80,8 @@ pub(crate) struct Context {
     log: UnsafeCell<Option<trace::Writer>>,
     panic: Cell<PanicRecord>,
     in_step: Cell<bool>,
+    /// How good what the step sends is.
+    quality: Cell<Quality>,
     /// The number of the step, times two: no other step of the process has it. Zero is none.
     step: Cell<u64>,
     /// Of how many inputs the step has taken messages without seeing them empty since.
@@ -125,6 +128,7 @@ impl Context {
             log: UnsafeCell::new(log),
             panic: Cell::new(PanicRecord::EMPTY),
             in_step: Cell::new(false),
+            quality: Cell::new(Quality::FULL),
             step: Cell::new(CONTEXTS.fetch_add(1, Ordering::Relaxed) << STEPS),
             open: Cell::new(0),
             directory,
@@ -149,6 +153,7 @@ impl Context {
         self.now.set(now);
         self.agent.set(agent);
         self.in_step.set(true);
+        self.quality.set(Quality::FULL);
         self.step.set(self.step.get() + 2);
         self.open.set(0);
     }
@@ -220,6 +225,15 @@ impl Context {
     #[inline]
     pub(crate) fn agent(&self) -> AgentId {
         self.agent.get()
+    }
+
+    #[inline]
+    pub(crate) fn quality(&self) -> Quality {
+        self.quality.get()
+    }
+
+    pub(crate) fn set_quality(&self, quality: Quality) {
+        self.quality.set(quality);
     }
 
     /// Asks for a step at `time`, or sooner if it was asked for sooner.

@@ -26,6 +26,7 @@ use crate::budget::Budget;
 use crate::door::{CHANGES, Door};
 use crate::fetch::{Depth, fetch};
 use crate::handover::Running;
+use crate::means::Means;
 use crate::os;
 use crate::port::{InputEnd, Rest};
 use crate::processor::{Checks, rate};
@@ -43,6 +44,7 @@ pub(crate) struct Timing {
     pub hang_after: Duration,
     /// What it needs where its executor runs by its deadline; nothing where that is not known.
     pub budget: Option<Budget>,
+    pub means: Means,
 }
 
 /// An agent's place in an executor. What every step uses stands together.
@@ -65,6 +67,8 @@ pub(crate) struct Seat {
     pub alarm: Time,
     /// The step that a message asked for too soon after the last one: when it may be. The next step is that one, whatever for.
     pub put_off: Time,
+    /// How many refinements its last step made.
+    pub refined: u32,
     pub last_step: Time,
     pub next_release: Time,
     /// Whether its time has come and its step has not begun: it is among those that are due, once.
@@ -90,7 +94,12 @@ pub enum StepFault {
     Hang,
     /// Only every fourth of its steps is done.
     Slow,
+    /// Its steps take three times as long.
+    Heavy,
 }
+
+/// How many times as long the steps of an agent take that is [`StepFault::Heavy`].
+pub(crate) const HEAVY: i64 = 3;
 
 /// Why an agent died.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -265,7 +274,12 @@ impl Core {
             let slot = self.ready.take()?;
             let Some(seat) = self.seats.get(slot as usize).and_then(Option::as_deref) else { continue };
             let deadline = now.saturating_add(seat.timing.deadline);
+            let is_active = seat.timing.means.is_active;
             if seat.timing.min_gap > Duration::ZERO && self.is_put_off(slot, now) {
+                continue;
+            }
+            if !is_active {
+                self.rest_at_queues(slot, Rest::Away);
                 continue;
             }
             return Some(Job { slot, release: now, deadline, by_clock: false });
@@ -342,6 +356,11 @@ impl Core {
             self.releases.pop();
             self.fetch_released();
             let Some(seat) = self.seats.get_mut(slot as usize).and_then(Option::as_mut) else { continue };
+            if !seat.timing.means.is_active {
+                // It is released anew when it goes on.
+                seat.next_release = Time::NEVER;
+                continue;
+            }
             let mut release = None;
             if seat.next_release <= now {
                 // Releases that were passed over are counted and never made up for: no burst.

@@ -70,6 +70,7 @@ extern crate self as runtime;
 mod agent;
 mod allocations;
 mod budget;
+mod census;
 mod check;
 mod composition;
 mod context;
@@ -79,6 +80,7 @@ mod fetch;
 mod folder;
 mod handover;
 mod log;
+mod means;
 mod memory;
 mod message_type;
 mod names;
@@ -108,23 +110,25 @@ pub use agent::{
     ServiceEnd, Step,
 };
 pub use allocations::Watched;
+pub use census::{Burden, Census, Foreign, Given, Host, HostReading, Resident};
 pub use check::{check, executors_of, not_by_deadline, wires_of};
 pub use composition::{Composition, End, Left, Member, PortAt, PortSeen, QueueSeen, WireSeen};
 pub use executor::{Cause, StepFault};
 pub use fetch::Depth;
 pub use folder::{FolderError, RunFolder};
 pub use log::{LogChoice, Noted, Recorder, write_note};
+pub use means::Method;
 pub use memory::Found;
 pub use message_type::{LARGEST_BY_VALUE, MessageType};
 pub use os::processor_time;
 pub use plan::{
-    AgentPlan, ExecutorPlan, OnDeath, Plan, Policy, TimedRequest, USUAL_DEPTH, USUAL_DEPTH_ON, Wirable,
-    WireFilter, WirePlan, owner, value_of,
+    AgentPlan, ExecutorPlan, Giving, OnDeath, Plan, Policy, TimedRequest, USUAL_DEPTH, USUAL_DEPTH_ON,
+    Wirable, WireFilter, WirePlan, owner, value_of,
 };
 pub use port::{
-    Decision, Direction, Envelope, Gives, Input, Look, NotAsked, Output, OutputFault, OwnAddress, OwnPort,
-    Place, Port, PortEnds, PortOptions, PortShape, PortVisit, REQUESTS_UNDER_WAY, Received, Router, Sent,
-    Takes, Why, WireCounts, WireId, Wiring,
+    Decision, Direction, Envelope, Gives, Input, Look, Manager, NotAsked, Output, OutputFault, OwnAddress,
+    OwnPort, Place, Port, PortEnds, PortOptions, PortShape, PortVisit, REQUESTS_UNDER_WAY, Received, Router,
+    Sent, Takes, Why, WireCounts, WireId, Wiring,
 };
 pub use queue_plan::{MOST_SERVING, PlanParts, Queue, QueuePlan};
 pub use request::{
@@ -132,7 +136,7 @@ pub use request::{
     Request, SystemView, WireTotals, WireView,
 };
 pub use ring::{MOST_MESSAGES, Overload};
-pub use router::{Admission, Incident, ServiceShape, robot_wires};
+pub use router::{Admission, Incident, ServiceShape, TIMING_KEYS, robot_wires};
 pub use service::{CALLS_UNDER_WAY, Call, Client, Reply, Service, Ticket};
 pub use simulated::Simulation;
 pub use stats::{AgentStats, Figure, Histogram};

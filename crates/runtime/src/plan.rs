@@ -6,6 +6,7 @@ use types::value::{Mistake, Span, Table, Value};
 use types::{AgentId, Category, Duration, Filter, Message};
 
 use crate::agent::{ClientEnd, Declare, InputEnd as To, OutputEnd as From, ServiceEnd};
+use crate::means::Method;
 use crate::queue_plan::{MOST_SERVING, Queue, QueuePlan};
 use crate::ring::Overload;
 
@@ -86,6 +87,41 @@ pub enum OnDeath {
     Leave,
 }
 
+/// What a resource manager may take from an agent when there is not time enough for all, and how little it shall.
+///
+/// Its period gives way within [`AgentPlan::period_range`], its methods and its budget down to the cheapest. One that says nothing of all that is
+/// not touched.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Giving {
+    /// How important it is, from 0 to 1: who is more important gives way less, and later. 0.5 when nothing is said.
+    pub importance: Option<f64>,
+    /// How readily its period gives way, beside those of others; 1 when nothing is said, and 0 for not at all.
+    pub elasticity: Option<f64>,
+    /// Of an agent that messages make run: how far the least time between two of its steps may be lengthened.
+    pub gap_max: Option<Duration>,
+    /// Whether it may be suspended, when nothing else is left.
+    pub may_suspend: bool,
+    /// Whether it is not to be touched, whatever else is said.
+    pub is_rigid: bool,
+    /// Whether it is suspended: it makes no step.
+    pub is_suspended: bool,
+}
+
+impl Giving {
+    /// The importance of an agent that says none.
+    pub const USUAL_IMPORTANCE: f64 = 0.5;
+
+    /// How important it is, from 0 to 1.
+    pub fn importance(&self) -> f64 {
+        self.importance.unwrap_or(Giving::USUAL_IMPORTANCE)
+    }
+
+    /// How readily its period gives way, beside those of others.
+    pub fn elasticity(&self) -> f64 {
+        self.elasticity.unwrap_or(1.0)
+    }
+}
+
 /// An agent in a plan.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct AgentPlan {
@@ -102,6 +138,16 @@ pub struct AgentPlan {
     /// Processor time of a step at worst, where its designer knows it: what analysis and admission count before steps were measured, and what a
     /// step takes on virtual processors.
     pub cost: Option<Duration>,
+    /// The same for each of its methods, where it has several; one that is not here costs what `cost` says.
+    pub methods: Vec<(String, Duration)>,
+    /// The method with which it begins; its best when nothing is said.
+    pub method: Option<String>,
+    /// Processor time of one refinement at worst, of an anytime agent.
+    pub refinement: Option<Duration>,
+    /// How long a step of an anytime agent may take with its refinements: it is asked before each.
+    pub budget: Option<Duration>,
+    /// How far the resource manager may give way for it, and it for others.
+    pub giving: Giving,
     /// How soon after its release a step must be done; the period when nothing is said.
     pub deadline: Option<Duration>,
     /// The inputs whose messages make it run.
@@ -179,6 +225,25 @@ pub struct TimedRequest {
 pub const USUAL_DEPTH: usize = 4;
 /// Depth of a wire that makes its receiver run: refuse.
 pub const USUAL_DEPTH_ON: usize = 16;
+
+impl AgentPlan {
+    /// What a step takes at worst by the method of this name, as far as the plan declares it.
+    pub fn cost_by(&self, method: &str) -> Option<Duration> {
+        let own = self.methods.iter().find(|(name, _)| name == method);
+        own.map(|(_, cost)| *cost).or(self.cost)
+    }
+
+    /// What a step takes at worst without refinements, as far as the plan declares it: by the method that is set, or the best of `known`.
+    pub fn cost_of_step(&self, known: &[Method]) -> Option<Duration> {
+        let method = self.method.as_deref().or(known.first().map(|best| best.name));
+        method.map_or(self.cost, |method| self.cost_by(method))
+    }
+
+    /// The same with refinements.
+    pub fn cost_in_all(&self, known: &[Method]) -> Option<Duration> {
+        self.cost_of_step(known).max(self.budget)
+    }
+}
 
 impl WirePlan {
     /// A wire with the usual depth and policy.

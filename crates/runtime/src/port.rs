@@ -5,6 +5,7 @@
 
 mod faulty;
 mod input;
+mod manager;
 mod output;
 mod queue;
 mod route;
@@ -84,6 +85,8 @@ pub enum Direction {
     Client,
     /// Requests to the router go out and what it decided comes in.
     Router,
+    /// What the resource manager sets goes out, and how things are comes in.
+    Manager,
 }
 
 impl Direction {
@@ -95,6 +98,7 @@ impl Direction {
             Direction::Service => "service",
             Direction::Client => "client",
             Direction::Router => "router",
+            Direction::Manager => "manager",
         }
     }
 }
@@ -122,6 +126,7 @@ impl PortShape {
 pub struct PortEnds {
     pub(crate) input: Option<Arc<dyn InputEnd>>,
     pub(crate) output: Option<Arc<dyn OutputEnd>>,
+    pub(crate) manager: Option<Arc<ManagerEnd>>,
 }
 
 /// A port of any type.
@@ -292,6 +297,8 @@ struct Parcel<P> {
 
 pub use input::{Input, Received};
 pub(crate) use input::{InputCore, downcast_input, input_core};
+pub use manager::Manager;
+pub(crate) use manager::{Asked, ManagerEnd};
 pub use output::{Envelope, Output};
 pub(crate) use output::{OutputCore, downcast_output, output_core};
 pub(crate) use queue::{QueueEnd, QueueForm, QueueWire, Rest, Teller};

@@ -42,7 +42,7 @@ pub enum Request {
         /// The input.
         to: String,
     },
-    /// Sets a parameter, or `period`, `deadline`, `min_gap`, `cost`.
+    /// Sets a parameter, or an entry of [`TIMING_KEYS`](crate::TIMING_KEYS).
     Set {
         /// Whose.
         agent: String,
@@ -121,11 +121,13 @@ pub enum FaultKind {
     Panic,
     /// Does not return from its next step.
     Hang,
+    /// Takes three times as long for its steps.
+    Heavy,
 }
 
 impl FaultKind {
     /// All kinds.
-    pub const ALL: [FaultKind; 10] = [
+    pub const ALL: [FaultKind; 11] = [
         FaultKind::Ok,
         FaultKind::Off,
         FaultKind::Stuck,
@@ -136,6 +138,7 @@ impl FaultKind {
         FaultKind::Intermittent,
         FaultKind::Panic,
         FaultKind::Hang,
+        FaultKind::Heavy,
     ];
 
     /// Its name on the command line.
@@ -151,6 +154,7 @@ impl FaultKind {
             FaultKind::Intermittent => "intermittent",
             FaultKind::Panic => "panic",
             FaultKind::Hang => "hang",
+            FaultKind::Heavy => "heavy",
         }
     }
 
@@ -167,6 +171,7 @@ impl FaultKind {
             FaultKind::Slow => Some(StepFault::Slow),
             FaultKind::Panic => Some(StepFault::Panic),
             FaultKind::Hang => Some(StepFault::Hang),
+            FaultKind::Heavy => Some(StepFault::Heavy),
             _ => None,
         }
     }
@@ -273,6 +278,12 @@ pub struct AgentView {
     pub last_death: Option<String>,
     /// The time between two steps, if it has a period.
     pub period: Option<Duration>,
+    /// The method that it uses, where it has several.
+    pub method: Option<&'static str>,
+    /// How long its steps may take with refinements, if it makes any.
+    pub budget: Option<Duration>,
+    /// Whether it is suspended.
+    pub is_suspended: bool,
     /// How soon a step must be done.
     pub deadline: Duration,
     /// Its parameters.
@@ -296,7 +307,7 @@ pub struct AgentView {
 }
 
 /// What is counted of an agent.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Counts {
     /// Steps.
     pub releases: u64,
@@ -314,6 +325,12 @@ pub struct Counts {
     pub hangs: u64,
     /// Times that it was started again.
     pub restarts: u64,
+    /// Refinements that its steps made.
+    pub refinements: u64,
+    /// Steps that took longer than the budget that they had for refinements.
+    pub overruns: u64,
+    /// What its results lacked of the best that it can do, summed over its steps: of one without any result, 1.
+    pub quality_lost: f64,
     /// Steps that are not among those of the figure of execution times, because the witness saw a stall in them.
     pub left_out: u64,
     /// Steps whose execution time was held against the thread's own clock.

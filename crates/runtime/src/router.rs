@@ -13,6 +13,7 @@ mod agents;
 mod asking;
 mod calls;
 mod deaths;
+mod managing;
 mod order;
 mod queues;
 mod requests;
@@ -20,6 +21,7 @@ mod script;
 mod staged;
 #[cfg(all(test, not(loom)))]
 mod tests;
+mod timing;
 mod view;
 mod wires;
 
@@ -31,22 +33,27 @@ use types::{AgentId, Duration, Filter, Priority, Time};
 
 use crate::agent::{AgentType, Body, Registry};
 use crate::budget::budget_of;
-use crate::executor::{Link, StepFault, Timing};
+use crate::executor::{HEAVY, Link, StepFault, Timing};
 use crate::log::{LogChoice, LogShared};
+use crate::means::Means;
 use crate::names::Directory;
 use crate::plan::{AgentPlan, ExecutorPlan, WireFilter, WirePlan};
 use crate::port::{Direction, InputEnd, OutputEnd, OutputFault, PortEnds, WireCounts, WireId};
 use crate::queue_plan::PlanParts;
 use crate::request::{AgentState, Refusal, WireTotals};
 use crate::ring::Overload;
-use crate::stats::AgentStats;
+use crate::stats::{AgentStats, Window};
 use crate::tap::Tap;
 
 pub use admission::Admission;
+pub(crate) use admission::{AS_PLAYED, WITH_MARGIN};
 pub(crate) use asking::Said;
 pub(crate) use calls::OutsideCall;
 pub use calls::ServiceShape;
 pub(crate) use staged::Staged;
+pub use timing::TIMING_KEYS;
+
+use timing::Nominal;
 
 /// Readers for which an output's memory has room besides those in the plan.
 const SPARE_SEATS: usize = 8;
@@ -77,6 +84,13 @@ struct Known {
     /// The wires that touch it.
     wires: BTreeSet<WireId>,
     stats: Arc<AgentStats>,
+    /// What its steps took of late, for resource managers and for admission.
+    window: Window,
+    long_window: Window,
+    /// What it was admitted with: what a longer step is told of.
+    admitted: Option<Duration>,
+    /// What its plan says, or a person, where the resource manager has set something else.
+    nominal: Nominal,
     timing: Timing,
     fault: StepFault,
     output_faults: Vec<OutputFault>,
@@ -137,6 +151,19 @@ impl Known {
         let name = self.kind.ports[port].name;
         self.plan.on.iter().any(|on| on == name)
     }
+}
+
+/// What is to be known of an agent whose step is played on a virtual processor.
+pub(crate) struct Played {
+    pub of: AgentId,
+    /// Where it sends.
+    pub outputs: Vec<Arc<dyn OutputEnd>>,
+    /// What its step takes without refinements.
+    pub cost: Duration,
+    /// What one refinement takes.
+    pub refinement: Duration,
+    /// How long it may take with them; zero where there are none.
+    pub budget: Duration,
 }
 
 /// A port of an agent.
@@ -209,6 +236,7 @@ pub(crate) struct Router {
     wires: BTreeMap<WireId, Wire>,
     queues: Vec<queues::Queue>,
     asking: asking::Asking,
+    managing: managing::Managing,
     pub executors: Vec<ExecutorKnown>,
     added: u64,
     next_wire: u32,
@@ -230,8 +258,11 @@ pub(crate) struct Router {
     now: Time,
     /// What admission counts with; nothing where everything is admitted.
     admission: Option<Admission>,
-    /// Whether steps are measured: in simulated time what the host took for them says nothing, and would not be the same again.
-    pub measures: bool,
+    /// By how many percent of what was measured of late the next step is counted, where steps are measured: in simulated time what the host
+    /// took for them says nothing, and what they were played to take is exact.
+    pub measures: Option<i64>,
+    /// When it was last looked whether somebody has outgrown what it was admitted with.
+    grown_at: Time,
     log: LogChoice,
     pub log_shared: Arc<LogShared>,
     robots: Vec<String>,
@@ -256,6 +287,7 @@ impl Router {
             wires: BTreeMap::new(),
             queues: Vec::new(),
             asking: asking::Asking::default(),
+            managing: managing::Managing::default(),
             executors,
             added: 0,
             next_wire: 0,
@@ -269,7 +301,8 @@ impl Router {
             past: WireTotals::default(),
             now: Time::ZERO,
             admission: None,
-            measures: false,
+            measures: None,
+            grown_at: Time(i64::MIN / 2),
             log: LogChoice::default(),
             log_shared: LogShared::new(),
             robots,
@@ -316,13 +349,18 @@ impl Router {
         self.seated(executor, slot).map_or(LEAST_HANG, |known| known.timing.hang_after)
     }
 
-    /// The agent in a slot, where it sends, and the processor time of its step.
-    pub(crate) fn played(&self, executor: usize, slot: u32) -> (AgentId, Vec<Arc<dyn OutputEnd>>, Duration) {
-        let Some(known) = self.seated(executor, slot) else {
-            return (AgentId::NONE, Vec::new(), Duration::ZERO);
-        };
+    /// The agent in a slot, where it sends, and what its step takes.
+    pub(crate) fn played(&self, executor: usize, slot: u32) -> Option<Played> {
+        let known = self.seated(executor, slot)?;
         let outputs = known.ends.iter().filter_map(|ends| ends.output.clone());
-        (known.id, outputs.collect(), known.plan.cost.unwrap_or(Duration::ZERO))
+        let times = if known.fault == StepFault::Heavy { HEAVY } else { 1 };
+        Some(Played {
+            of: known.id,
+            outputs: outputs.collect(),
+            cost: known.plan.cost_of_step(known.kind.methods).unwrap_or(Duration::ZERO) * times,
+            refinement: known.plan.refinement.unwrap_or(Duration::ZERO) * times,
+            budget: known.timing.means.budget,
+        })
     }
 
     /// Who sits in a slot.
@@ -414,8 +452,17 @@ impl Router {
         })
     }
 
-    /// The running system as a plan that would start it.
+    /// The running system as a plan that would start it: with what was asked for, not with what the resource manager makes of it.
     pub(crate) fn to_plan(&self) -> PlanParts {
+        let mut parts = self.to_plan_as_it_is();
+        for (plan, known) in parts.0.iter_mut().zip(self.in_order()) {
+            known.nominal.put(plan);
+        }
+        parts
+    }
+
+    /// The running system as it is at the moment.
+    pub(crate) fn to_plan_as_it_is(&self) -> PlanParts {
         let agents = self.in_order().into_iter();
         let agents = agents.map(|known| AgentPlan { params: known.params.clone(), ..known.plan.clone() });
         let wires = self.wires.values().filter(|wire| !wire.is_answer).map(|wire| self.plan_of(wire));
@@ -522,7 +569,14 @@ pub(crate) fn timing_of(plan: &AgentPlan) -> Result<Timing, Refusal> {
         )));
     }
     let hang_after = plan.hang_after.unwrap_or((deadline * 4).max(LEAST_HANG));
-    let mut timing = Timing { period, deadline, min_gap: plan.min_gap, hang_after, budget: None };
+    let means = Means::PLAIN;
+    let mut timing = Timing { period, deadline, min_gap: plan.min_gap, hang_after, budget: None, means };
     timing.budget = budget_of(plan, &timing).ok();
     Ok(timing)
+}
+
+/// The same of an agent of this type, with what it may use.
+pub(crate) fn timing_as(plan: &AgentPlan, kind: &AgentType) -> Result<Timing, Refusal> {
+    let means = Means::of(plan, kind).map_err(all)?;
+    Ok(Timing { means, ..timing_of(plan)? })
 }

@@ -182,7 +182,8 @@ impl<Q: Message, A: Message> Port for Service<Q, A> {
     }
 
     fn create(&self, options: &PortOptions, seats: usize) -> PortEnds {
-        PortEnds { input: Some(input_core::<Q>()), output: Some(output_core::<A>(options, seats)) }
+        let (input, output) = (input_core::<Q>(), output_core::<A>(options, seats));
+        PortEnds { input: Some(input), output: Some(output), ..PortEnds::default() }
     }
 
     fn bind(&mut self, ends: &PortEnds) {
@@ -202,7 +203,8 @@ impl<Q: Message, A: Message> Port for Client<Q, A> {
     }
 
     fn create(&self, options: &PortOptions, seats: usize) -> PortEnds {
-        PortEnds { input: Some(input_core::<A>()), output: Some(output_core::<Q>(options, seats)) }
+        let (input, output) = (input_core::<A>(), output_core::<Q>(options, seats));
+        PortEnds { input: Some(input), output: Some(output), ..PortEnds::default() }
     }
 
     fn bind(&mut self, ends: &PortEnds) {

@@ -15,6 +15,7 @@ use types::{Duration, Time};
 
 use self::busy::Busy;
 use crate::agent::Registry;
+use crate::census::HostReading;
 use crate::context::{Context, install_panic_hook};
 use crate::executor::{Core, Ended, Job};
 use crate::handover::Running;
@@ -47,7 +48,8 @@ impl Simulation {
     /// Builds what a plan describes.
     pub fn new(plan: &Plan, registry: &Registry, options: Options) -> Result<Simulation, CannotRun> {
         install_panic_hook();
-        let built = build(plan, registry, &options, Time::ZERO)?;
+        let mut options = options;
+        let built = build(plan, registry, &mut options, Time::ZERO)?;
         let (control, asks) = asks();
         let mut timed = Vec::new();
         for request in &plan.requests {
@@ -137,7 +139,7 @@ fn play(simulation: Simulation) -> Result<Report, CannotRun> {
     drop(control);
     let Built { router, cores, directory } = built;
     let (writer, reader) = trace::ring(trace::LARGE, true);
-    let Options { limit, speed, recorder, mut observer, processors, .. } = options;
+    let Options { limit, speed, recorder, mut observer, processors, burdens, .. } = options;
     let log_shared = router.log_shared.clone();
     let log = LogThread::start(log_shared, vec![reader], recorder, directory.clone())?;
     let mut order: Vec<usize> = (0..cores.len()).collect();
@@ -158,9 +160,11 @@ fn play(simulation: Simulation) -> Result<Report, CannotRun> {
     };
 
     if let Some(count) = processors {
+        player.router.measures = Some(crate::router::AS_PLAYED);
         player.cores.iter_mut().for_each(Core::count_elsewhere);
         let executors = player.router.executors.iter().map(|executor| &executor.plan);
-        player.busy = Some(Box::new(Busy::new(count, executors)));
+        let told = player.router.has_manager();
+        player.busy = Some(Box::new(Busy::new(count, executors, burdens, told)));
     }
     let entered = player.context.enter();
     let begun = os::monotonic();
@@ -372,19 +376,31 @@ impl Player {
 
     /// Decides what agents have asked of the router, once at each instant, so that a run goes on whatever they ask.
     fn decide_asked(&mut self) {
-        if !self.router.is_asked() || self.decided == self.now {
+        if !(self.router.is_asked() || self.router.is_managed()) || self.decided == self.now {
             return;
         }
         self.decided = self.now;
-        let mut fabric = Still { cores: &mut self.cores, context: &self.context, now: self.now };
-        for Said { agent, what } in self.router.decide_asked(self.now, &mut fabric) {
-            self.context.log(|log| log.line(self.now, &agent, &what));
+        let now = self.now;
+        let mut fabric = Still { cores: &mut self.cores, context: &self.context, now };
+        let mut said = self.router.decide_asked(now, &mut fabric);
+        if self.router.is_managed() {
+            let busy = &mut self.busy;
+            let mut host = || busy.as_mut().map_or_else(HostReading::default, |busy| busy.reading(now));
+            said.extend(self.router.manage(now, Some(&mut host), &mut fabric));
+            self.order.sort_by_key(|at| place_of(&self.router, &self.cores, *at));
+        }
+        for Said { agent, what } in said {
+            self.context.log(|log| log.line(now, &agent, &what));
         }
     }
 
     /// When what was asked since then is decided.
     fn next_decision(&self) -> Time {
-        if self.router.is_asked() { self.now + DECIDES_AGAIN } else { Time::NEVER }
+        if self.router.is_asked() || self.router.is_managed() {
+            self.now + DECIDES_AGAIN
+        } else {
+            Time::NEVER
+        }
     }
 
     /// Answers what was asked from outside. Says why the run ends, if it does.
@@ -444,7 +460,12 @@ impl Player {
         if let Some(busy) = &self.busy {
             let free = self.cores.iter().enumerate().filter(|(at, _)| !busy.is_busy(*at));
             let releases = free.map(|(_, core)| core.next_release());
-            return releases.min().unwrap_or(Time::NEVER).min(hung).min(busy.next_end());
+            return releases
+                .min()
+                .unwrap_or(Time::NEVER)
+                .min(hung)
+                .min(busy.next_end())
+                .min(busy.next_burden());
         }
         let releases =
             self.cores.iter().zip(&self.blocked).map(|(core, blocked)| core.next_release().max(*blocked));

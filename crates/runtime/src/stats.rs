@@ -2,7 +2,7 @@
 
 use core::sync::atomic::{AtomicU32, AtomicU64, Ordering::Relaxed};
 
-use types::Duration;
+use types::{Duration, Time};
 
 use crate::fetch::fetch;
 
@@ -148,6 +148,58 @@ fn figure(parts: &[&Histogram]) -> Figure {
     }
 }
 
+/// What steps took of late: since one time or another within the last two spans.
+///
+/// It is told from how the counts of histograms grow, so nobody who makes steps has to do with it.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Window {
+    /// The counts at the beginning of this span and of the one before.
+    this: Vec<u64>,
+    before: Vec<u64>,
+    begun: Option<Time>,
+    /// How many steps there had been when it was made.
+    earlier: u64,
+}
+
+impl Window {
+    /// One that begins now.
+    pub(crate) fn of(stats: &AgentStats) -> Window {
+        let counts = stats.exec_counts();
+        let earlier = counts.iter().sum();
+        Window { before: counts.clone(), this: counts, begun: None, earlier }
+    }
+
+    /// How many steps there were since it was made.
+    pub(crate) fn steps(&self, stats: &AgentStats) -> u64 {
+        stats.longest().0.saturating_sub(self.earlier)
+    }
+
+    /// The longest step as far as the window has been looked at, and since.
+    pub(crate) fn longest(&self, stats: &AgentStats) -> Duration {
+        self.new(stats).1
+    }
+
+    /// How many steps there were, and the longest of them, to an eighth of a doubling.
+    pub(crate) fn look(&mut self, stats: &AgentStats, now: Time, span: Duration) -> (u64, Duration) {
+        let counts = stats.exec_counts();
+        let begun = *self.begun.get_or_insert(now);
+        if now - begun >= span {
+            self.before = core::mem::replace(&mut self.this, counts);
+            self.begun = Some(now);
+        }
+        self.new(stats)
+    }
+
+    fn new(&self, stats: &AgentStats) -> (u64, Duration) {
+        let counts = stats.exec_counts();
+        let new = |at: usize| counts[at] - self.before.get(at).copied().unwrap_or(0);
+        let steps = (0..BUCKETS).map(new).sum();
+        let longest = (0..BUCKETS).rev().find(|at| new(*at) > 0).map_or(0.0, upper);
+        let (_, ever) = stats.longest();
+        (steps, Duration(longest.ceil() as i64).min(ever))
+    }
+}
+
 /// What is counted of an agent.
 #[derive(Debug, Default)]
 pub struct AgentStats {
@@ -175,6 +227,12 @@ pub struct AgentStats {
     pub disagreed: AtomicU64,
     /// How often its steps took or freed memory.
     pub allocations: AtomicU64,
+    /// Refinements that steps made.
+    pub refinements: AtomicU64,
+    /// Steps that took longer than the budget that they had for refinements.
+    pub overruns: AtomicU64,
+    /// What steps lacked of the best result, in steps of [`Quality`](types::header::Quality), in all.
+    pub quality_lost: AtomicU64,
     /// How long steps used their processor (ns): on the wall clock without what higher executors took from them. Those of `undisturbed`
     /// are not here.
     pub(crate) exec: Histogram,
@@ -190,6 +248,17 @@ impl AgentStats {
     /// How long steps used their processor (ns): on the wall clock without what higher executors took from them.
     pub fn exec(&self) -> Figure {
         figure(&[&self.exec, &self.undisturbed])
+    }
+
+    /// The counts of all steps of the histogram of how long steps took.
+    fn exec_counts(&self) -> Vec<u64> {
+        counts(&[&self.exec, &self.undisturbed])
+    }
+
+    /// How long all steps together used their processor.
+    pub(crate) fn used(&self) -> Duration {
+        let parts = [&self.exec, &self.undisturbed];
+        Duration(parts.iter().map(|part| part.sum.load(Relaxed)).sum::<u64>() as i64)
     }
 
     /// How many steps were timed, and how long the longest of them used its processor.
@@ -256,6 +325,22 @@ pub(crate) fn nanos(span: Duration) -> u64 {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_window_forgets_what_was_long_ago() {
+        let stats = AgentStats::default();
+        let mut window = Window::default();
+        let at = |secs: i64| Time::ZERO + Duration::secs(secs);
+        stats.exec.add(9_000_000);
+        assert_eq!(window.look(&stats, at(0), Duration::secs(2)), (1, Duration::millis(9)));
+        stats.undisturbed.add(1_000_000);
+        assert_eq!(window.look(&stats, at(2), Duration::secs(2)), (2, Duration::millis(9)));
+        stats.exec.add(1_000_000);
+        let (steps, longest) = window.look(&stats, at(4), Duration::secs(2));
+        assert_eq!(steps, 1, "the two before the span before this one are forgotten");
+        assert!((1_000_000..=1_125_000).contains(&longest.0), "{longest}");
+        assert_eq!(window.look(&stats, at(8), Duration::secs(2)), (0, Duration::ZERO));
+    }
 
     proptest::proptest! {
         /// The percentile of the histogram lies within one step of the true one.

@@ -7,6 +7,7 @@ use std::sync::mpsc::{Receiver, SyncSender, sync_channel};
 use types::{Duration, Time};
 
 use crate::agent::Registry;
+use crate::census::{Burden, Host};
 use crate::check::{executors_of, wires_of};
 use crate::executor::Core;
 use crate::log::{LogChoice, Noted, Recorder};
@@ -136,6 +137,10 @@ pub struct Options {
     /// In simulated time: on how many virtual processors steps take the costs that the plan declares; none takes any time when nothing
     /// is said.
     pub processors: Option<usize>,
+    /// What takes time of the virtual processors besides the agents.
+    pub burdens: Vec<Burden>,
+    /// Who tells resource managers how loaded the computer is, on the wall clock.
+    pub host: Option<Box<dyn Host>>,
     /// How a timed request of the plan, in words, becomes a request.
     pub parse: fn(&[String]) -> Result<Request, Refusal>,
 }
@@ -150,6 +155,8 @@ impl Default for Options {
             observer: Box::new(NoObserver),
             admission: None,
             processors: None,
+            burdens: Vec::new(),
+            host: None,
             parse: |words| Err(Refusal::new(format!("\"{}\" cannot be asked here", words.join(" ")))),
         }
     }
@@ -234,7 +241,7 @@ impl Fabric for Still<'_> {
 pub(crate) fn build(
     plan: &Plan,
     registry: &Registry,
-    options: &Options,
+    options: &mut Options,
     now: Time,
 ) -> Result<Built, CannotRun> {
     let mistakes = crate::check::check(plan, registry);
@@ -254,6 +261,9 @@ pub(crate) fn build(
         Router::new(&plan.name, registry.clone(), executors, robots.unwrap_or_default(), directory.clone());
     router.set_log(options.log.clone());
     router.set_admission(options.admission.clone());
+    if let Some(host) = options.host.take() {
+        router.set_host(Arc::new(std::sync::Mutex::new(host)));
+    }
     let context = crate::context::Context::new(None, directory.clone());
     let wires = wires_of(plan, registry);
     let mut fabric = Still { cores: &mut cores, context: &context, now };

@@ -3,11 +3,11 @@
 use std::collections::HashMap;
 
 use schedule::Exact;
-use schedule::processors::{ANYWHERE, Mask};
 use schedule::system::{Agent, Executor, Source, System, Unsound};
 use types::Duration;
 
 use crate::agent::Registry;
+use crate::census::mask_of;
 use crate::check::{executors_of, wires_of};
 use crate::plan::{AgentPlan, ExecutorPlan, Plan, USUAL_DEPTH_ON, WirePlan, owner};
 use crate::port::Direction;
@@ -44,12 +44,9 @@ pub fn timetable(plan: &Plan, registry: &Registry, assumed: &Assumed<'_>) -> Tim
     let executors = executors_of(plan);
     // Those by deadline stand above all others, on one level: each is taken to wait for all the rest, which it does at worst, whoever of them
     // has the earliest deadline. In the order of their deadlines the sum were less, and too little.
-    let threads = executors.iter().map(|executor| Executor {
-        priority: executor.level(),
-        may: executor.cpus.iter().fold(0, |mask, cpu| mask | Mask::from(1u8) << (cpu & 63)),
-    });
-    let threads =
-        threads.map(|thread| Executor { may: if thread.may == 0 { ANYWHERE } else { thread.may }, ..thread });
+    let threads = executors
+        .iter()
+        .map(|executor| Executor { priority: executor.level(), may: mask_of(&executor.cpus) });
     let wires = wires_of(plan, registry);
     let ways = Ways::of(plan, registry, &wires);
     let agents = plan.agents.iter().map(|agent| {

@@ -122,8 +122,9 @@ impl Live {
     pub fn new(plan: &Plan, registry: &Registry, options: Options) -> Result<Live, CannotRun> {
         install_panic_hook();
         let clock = WallClock::start();
-        let mut built = build(plan, registry, &options, clock.now())?;
-        built.router.measures = true;
+        let mut options = options;
+        let mut built = build(plan, registry, &mut options, clock.now())?;
+        built.router.measures = Some(crate::router::WITH_MARGIN);
         let (control, asks) = asks();
         let mut timed = Vec::new();
         for request in &plan.requests {
@@ -369,7 +370,11 @@ impl Runner {
         let mut fabric = Threads::new(&self.cells);
         self.router.supervise(now, &mut fabric);
         self.router.answer_calls(now, &mut fabric);
-        for Said { agent, what } in self.router.decide_asked(now, &mut Threads::new(&self.cells)) {
+        let mut said = self.router.decide_asked(now, &mut Threads::new(&self.cells));
+        if self.router.is_managed() {
+            said.extend(self.router.manage(now, None, &mut Threads::new(&self.cells)));
+        }
+        for Said { agent, what } in said {
             self.router.log_shared.note(now, &agent, &what);
         }
         for incident in &self.router.incidents[self.incidents_seen..] {

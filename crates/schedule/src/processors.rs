@@ -88,6 +88,11 @@ impl Processors {
         self.threads.len() - 1
     }
 
+    /// How many processors there are.
+    pub fn count(&self) -> usize {
+        self.count
+    }
+
     /// What time it is.
     pub fn now(&self) -> i128 {
         self.now

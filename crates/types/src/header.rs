@@ -86,6 +86,32 @@ impl AgentId {
     pub const NONE: AgentId = AgentId(u32::MAX);
 }
 
+/// How good a result is: 255 is the best that its sender can do, and what everybody sends who says nothing.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+#[repr(transparent)]
+pub struct Quality(pub u8);
+
+impl Quality {
+    /// The best that its sender can do.
+    pub const FULL: Quality = Quality(u8::MAX);
+
+    /// From a share, 0 to 1, to the nearest step; what is no number is nothing.
+    pub fn of(share: f64) -> Quality {
+        Quality((share.clamp(0.0, 1.0) * 255.0 + 0.5) as u8)
+    }
+
+    /// As a share, from 0 to 1.
+    pub fn share(self) -> f64 {
+        f64::from(self.0) / 255.0
+    }
+}
+
+impl Default for Quality {
+    fn default() -> Quality {
+        Quality::FULL
+    }
+}
+
 /// What every message carries besides its payload.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[repr(C)]
@@ -106,6 +132,8 @@ pub struct Header {
     pub category: Category,
     /// How urgent it is.
     pub priority: Priority,
+    /// How good the result is that it brings.
+    pub quality: Quality,
 }
 
 impl Default for Header {
@@ -119,6 +147,7 @@ impl Default for Header {
             marker: 0,
             category: Category::Data,
             priority: Priority::Normal,
+            quality: Quality::FULL,
         }
     }
 }
@@ -171,6 +200,14 @@ impl Filter {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_quality_is_a_share_to_one_step() {
+        for (share, step) in [(0.0, 0), (1.0, 255), (0.6, 153), (2.0, 255), (-1.0, 0), (f64::NAN, 0)] {
+            assert_eq!(Quality::of(share), Quality(step), "{share}");
+        }
+        assert!((Quality::of(0.37).share() - 0.37).abs() <= 0.5 / 255.0);
+    }
 
     #[test]
     fn the_filter_for_all_passes_all_and_others_choose() {

@@ -50,7 +50,11 @@ pub const CHANGES: [Usage; 13] = [
         "makes a wire",
     ),
     usage("unwire", "unwire FROM TO", "cuts a wire, when what is on it has arrived"),
-    usage("set", "set NAME KEY=VALUE…", "sets parameters, or the period, deadline, min_gap or cost"),
+    usage(
+        "set",
+        "set NAME KEY=VALUE…",
+        "sets parameters, or the period, deadline, min_gap, cost, method, budget, importance or suspended=true",
+    ),
     usage("fault", "fault AGENT|OUTPUT KIND", "makes an agent or an output misbehave; \"ok\" ends it"),
     usage("send", "send PORT cdr=HEX", "sends a message out of a port"),
     usage("call", "call SERVICE cdr=HEX [within=2s]", "calls a service, and does not wait for the answer"),

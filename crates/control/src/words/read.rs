@@ -118,6 +118,7 @@ fn read_add(words: &[String]) -> Read<AgentPlan> {
     plan.deadline = pairs.span("deadline")?;
     plan.hang_after = pairs.span("hang_after")?;
     plan.min_gap = pairs.span("min_gap")?.unwrap_or_default();
+    read_means(&mut pairs, &mut plan)?;
     if let Some(inputs) = pairs.take("on") {
         plan.on = inputs
             .split(',')
@@ -134,6 +135,31 @@ fn read_add(words: &[String]) -> Read<AgentPlan> {
     }
     plan.params = pairs.into_params()?;
     Ok(plan)
+}
+
+/// How it may do its step, and what a resource manager may take from it.
+fn read_means(pairs: &mut Pairs<'_>, plan: &mut AgentPlan) -> Read<()> {
+    if let Some(methods) = pairs.take("methods") {
+        plan.methods = methods.split(',').map(read_method).collect::<Read<_>>()?;
+    }
+    plan.method = pairs.take("method").map(str::to_owned);
+    plan.refinement = pairs.span("refinement")?;
+    plan.budget = pairs.span("budget")?;
+    let giving = &mut plan.giving;
+    giving.importance = pairs.parsed("importance", "a number")?;
+    giving.elasticity = pairs.parsed("elasticity", "a number")?;
+    giving.gap_max = pairs.span("gap_max")?;
+    giving.may_suspend = pairs.parsed("may_suspend", "true or false")?.unwrap_or(false);
+    giving.is_rigid = pairs.parsed("rigid", "true or false")?.unwrap_or(false);
+    giving.is_suspended = pairs.parsed("suspended", "true or false")?.unwrap_or(false);
+    Ok(())
+}
+
+fn read_method(text: &str) -> Read<(String, Duration)> {
+    let (name, cost) = text.split_once(':').ok_or_else(|| {
+        Refusal::new(format!("methods has \"{text}\"")).help("write it as in exact:12ms,rough:3ms")
+    })?;
+    Ok((name.trim().to_owned(), read_span("methods", cost)?))
 }
 
 /// A queue is added as an agent is.
@@ -265,9 +291,12 @@ impl<'a> Pairs<'a> {
     }
 
     pub(crate) fn number<N: FromStr>(&mut self, key: &str) -> Read<Option<N>> {
+        self.parsed(key, "a whole number that is not negative")
+    }
+
+    fn parsed<N: FromStr>(&mut self, key: &str, wanted: &str) -> Read<Option<N>> {
         let Some(text) = self.take(key) else { return Ok(None) };
-        let wrong =
-            |_| Refusal::new(format!("{key} must be a whole number that is not negative, not \"{text}\""));
+        let wrong = |_| Refusal::new(format!("{key} must be {wanted}, not \"{text}\""));
         text.parse().map(Some).map_err(wrong)
     }
 

@@ -3,7 +3,7 @@
 use proptest::collection::vec;
 use proptest::option;
 use proptest::prelude::*;
-use runtime::{AgentPlan, FaultKind, OnDeath, Overload, QueuePlan, Request, WireFilter, WirePlan};
+use runtime::{AgentPlan, FaultKind, Giving, OnDeath, Overload, QueuePlan, Request, WireFilter, WirePlan};
 use types::header::LeastPriority;
 use types::value::{Table, Value};
 use types::{Category, Duration, Priority};
@@ -11,7 +11,17 @@ use types::{Category, Duration, Priority};
 use super::*;
 
 /// The keys of `add` that are no parameters of the agent.
-const AGENT_KEYS: [&str; 10] = [
+const AGENT_KEYS: [&str; 20] = [
+    "methods",
+    "method",
+    "refinement",
+    "budget",
+    "importance",
+    "elasticity",
+    "gap_max",
+    "may_suspend",
+    "rigid",
+    "suspended",
     "robot",
     "period",
     "period_range",
@@ -177,14 +187,26 @@ fn params() -> impl Strategy<Value = Table> {
 }
 
 prop_compose! {
+    fn giving()(
+        (importance, elasticity, gap_max) in (option::of(-9.0..9.0), option::of(0.0..1e9), option::of(span())),
+        (may_suspend, is_rigid, is_suspended) in any::<(bool, bool, bool)>(),
+    ) -> Giving {
+        Giving { importance, elasticity, gap_max, may_suspend, is_rigid, is_suspended }
+    }
+}
+
+prop_compose! {
     fn agent()(
         (name, kind, robot, executor) in (name(), name(), option::of(name()), option::of(name())),
         (period, period_range) in (option::of(span()), option::of((span(), span()))),
         (cost, deadline, hang_after, min_gap) in (option::of(span()), option::of(span()), option::of(span()), span()),
         (on, leaves, params) in (vec(name(), 0..3), any::<bool>(), params()),
+        (methods, method, refinement, budget) in
+            (vec((name(), span()), 0..3), option::of(name()), option::of(span()), option::of(span())),
+        giving in giving(),
     ) -> AgentPlan {
         let on_death = if leaves { OnDeath::Leave } else { OnDeath::Restart };
-        AgentPlan { name, kind, robot, executor, period, period_range, cost, deadline, hang_after, min_gap, on, on_death, params, ..AgentPlan::default() }
+        AgentPlan { name, kind, robot, executor, period, period_range, cost, deadline, hang_after, min_gap, on, on_death, params, methods, method, refinement, budget, giving, ..AgentPlan::default() }
     }
 }
 

@@ -74,6 +74,20 @@ fn add(plan: &AgentPlan) -> Vec<String> {
     push(&mut out, "deadline", plan.deadline);
     push(&mut out, "hang_after", plan.hang_after);
     push(&mut out, "min_gap", (plan.min_gap != Duration::ZERO).then_some(plan.min_gap));
+    let methods = plan.methods.iter().map(|(name, cost)| format!("{name}:{cost}"));
+    push(&mut out, "methods", (!plan.methods.is_empty()).then(|| methods.collect::<Vec<_>>().join(",")));
+    push(&mut out, "method", plan.method.as_ref());
+    push(&mut out, "refinement", plan.refinement);
+    push(&mut out, "budget", plan.budget);
+    let giving = &plan.giving;
+    push(&mut out, "importance", giving.importance);
+    push(&mut out, "elasticity", giving.elasticity);
+    push(&mut out, "gap_max", giving.gap_max);
+    for (key, is) in
+        [("may_suspend", giving.may_suspend), ("rigid", giving.is_rigid), ("suspended", giving.is_suspended)]
+    {
+        push(&mut out, key, is.then_some(true));
+    }
     push(&mut out, "on", (!plan.on.is_empty()).then(|| plan.on.join(",")));
     push(&mut out, "on_death", (plan.on_death == OnDeath::Leave).then_some("leave"));
     push_params(&mut out, &plan.params);

@@ -9,7 +9,7 @@ use types::value::{Mistake, Span, Table, TableReader};
 use super::read::{ROBOT, Reader, span_of_time, unknown};
 
 /// The entries that every agent can have; all others are its parameters.
-const ENTRIES: [&str; 13] = [
+const ENTRIES: [&str; 23] = [
     "is",
     "robot",
     "period",
@@ -23,6 +23,16 @@ const ENTRIES: [&str; 13] = [
     "on_death",
     "hang_after",
     "use",
+    "methods",
+    "method",
+    "refinement",
+    "budget",
+    "importance",
+    "elasticity",
+    "gap_max",
+    "may_suspend",
+    "rigid",
+    "suspended",
 ];
 
 /// An executor's name that can be judged only when all executors are known.
@@ -71,6 +81,7 @@ impl Reader<'_> {
         }
         agent.robot = robot_of(&mut r, &self.robots, group_robot);
         timing(&mut r, &mut agent);
+        means(&mut r, &mut agent);
         inputs(&mut r, &mut agent, kind);
         if let Some(executor) = r.text("executor") {
             agent.executor = Some(executor.to_owned());
@@ -155,6 +166,31 @@ fn timing(r: &mut TableReader<'_>, agent: &mut AgentPlan) {
         r.report(Mistake::new(r.place(key), what));
     }
     agent.period_range = Some((least, most));
+}
+
+/// How it may do its step, and what a resource manager may take from it.
+fn means(r: &mut TableReader<'_>, agent: &mut AgentPlan) {
+    let at = r.place("methods");
+    if let Some(methods) = r.table("methods") {
+        let mut costs = TableReader::new(methods, at, "\"methods\"".to_owned());
+        for row in methods.rows() {
+            let cost = span_of_time(&mut costs, &row.key);
+            agent.methods.extend(cost.map(|cost| (row.key.clone(), cost)));
+        }
+        let mut wrong = Vec::new();
+        costs.finish(&mut wrong);
+        wrong.into_iter().for_each(|mistake| r.report(mistake));
+    }
+    agent.method = r.text("method").map(str::to_owned);
+    agent.refinement = span_of_time(r, "refinement");
+    agent.budget = span_of_time(r, "budget");
+    let giving = &mut agent.giving;
+    giving.importance = r.float_in("importance", 0.0, 1.0);
+    giving.elasticity = r.float_in("elasticity", 0.0, 1e6);
+    giving.gap_max = span_of_time(r, "gap_max");
+    giving.may_suspend = r.bool("may_suspend").unwrap_or(false);
+    giving.is_rigid = r.bool("rigid").unwrap_or(false);
+    giving.is_suspended = r.bool("suspended").unwrap_or(false);
 }
 
 fn inputs(r: &mut TableReader<'_>, agent: &mut AgentPlan, kind: Option<&AgentType>) {

@@ -16,6 +16,7 @@
 //! | the plan to a text | `write` |
 
 mod agent;
+mod burden;
 mod decide;
 mod group;
 mod library;
@@ -28,6 +29,7 @@ pub(crate) mod tree;
 mod wires;
 mod write;
 
+pub(crate) use burden::{burdens, processors};
 pub(crate) use decide::read_alone;
 pub use library::{Found, Shelf};
 pub(crate) use read::SECTIONS;

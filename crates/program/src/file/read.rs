@@ -16,11 +16,24 @@ use super::group::Names;
 use super::library::Shelf;
 use super::sources::{Mistakes, Sources};
 use super::wires::Written;
-use super::{decide, set, tree};
+use super::{burden, decide, set, tree};
 
 /// The sections of a system file.
-pub(crate) const SECTIONS: [&str; 11] =
-    ["name", "world", "robot", "executor", "agent", "queue", "wires", "decide", "goal", "vary", "at"];
+pub(crate) const SECTIONS: [&str; 13] = [
+    "name",
+    "world",
+    "processors",
+    "robot",
+    "executor",
+    "agent",
+    "queue",
+    "wires",
+    "decide",
+    "goal",
+    "vary",
+    "burden",
+    "at",
+];
 /// Longer than anything that robots do. Several such times can be added and each taken four times without an overflow.
 const LONGEST: Duration = Duration::secs(10 * 365 * 24 * 3600);
 /// The agent type that a robot is.
@@ -181,6 +194,7 @@ impl<'r> Reader<'r> {
         self.settle_wires();
         self.requests(tree);
         decide::read(self, tree);
+        burden::read(self, tree);
         self.read_world(tree);
         let judged = runtime::check(&self.plan, self.registry);
         let spoiled = &self.spoiled;

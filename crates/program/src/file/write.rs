@@ -131,6 +131,7 @@ fn agent(agent: &AgentPlan, decides: bool, out: &mut String) -> fmt::Result {
         span("period_max", Some(most), out)?;
     }
     span("cost", agent.cost, out)?;
+    means(agent, out)?;
     span("deadline", agent.deadline, out)?;
     match agent.on.as_slice() {
         [] => {}
@@ -150,6 +151,31 @@ fn agent(agent: &AgentPlan, decides: bool, out: &mut String) -> fmt::Result {
         if !is_section {
             entry(&row.key, &row.entry, out)?;
         }
+    }
+    Ok(())
+}
+
+fn means(agent: &AgentPlan, out: &mut String) -> fmt::Result {
+    if !agent.methods.is_empty() {
+        let costs = agent.methods.iter().map(|(name, cost)| format!("{} = \"{cost}\"", Key(name)));
+        writeln!(out, "methods = {{ {} }}", costs.collect::<Vec<_>>().join(", "))?;
+    }
+    if let Some(method) = &agent.method {
+        writeln!(out, "method = {}", Value::from(method.as_str()))?;
+    }
+    span("refinement", agent.refinement, out)?;
+    span("budget", agent.budget, out)?;
+    let giving = &agent.giving;
+    for (key, number) in [("importance", giving.importance), ("elasticity", giving.elasticity)] {
+        if let Some(number) = number {
+            writeln!(out, "{key} = {}", Value::Float(number))?;
+        }
+    }
+    span("gap_max", giving.gap_max, out)?;
+    let flags =
+        [("may_suspend", giving.may_suspend), ("rigid", giving.is_rigid), ("suspended", giving.is_suspended)];
+    for (key, _) in flags.into_iter().filter(|(_, is)| *is) {
+        writeln!(out, "{key} = true")?;
     }
     Ok(())
 }

@@ -18,6 +18,18 @@ fn text(json: &Json) -> String {
     }
 }
 
+/// How an agent is, and by which method it works where it has several.
+fn state(agent: &Json) -> String {
+    let state = match agent["suspended"].as_bool() {
+        Some(true) => "suspended".to_owned(),
+        _ => text(&agent["state"]),
+    };
+    match agent["method"].as_str() {
+        Some(method) => format!("{state}, {method}"),
+        None => state,
+    }
+}
+
 fn milliseconds(json: &Json) -> String {
     json.as_f64().map_or("-".to_owned(), |seconds| span(seconds * 1e9))
 }
@@ -30,7 +42,7 @@ pub(super) fn ls(answer: &Json) -> String {
         [
             text(&agent["name"]),
             text(&agent["kind"]),
-            text(&agent["state"]),
+            state(agent),
             text(&agent["executor"]),
             text(&agent["asked"]),
             text(&agent["granted"]),
@@ -158,7 +170,7 @@ pub(super) fn top(answer: &Json) -> String {
     lines.extend(rows(answer, "agents").map(|agent| {
         [
             text(&agent["name"]),
-            text(&agent["state"]),
+            state(agent),
             text(&agent["granted"]),
             text(&agent["releases"]),
             text(&agent["missed"]),

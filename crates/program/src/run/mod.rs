@@ -7,6 +7,7 @@
 //! ```
 
 mod asked;
+mod burden;
 mod judge;
 mod options;
 mod prepare;
@@ -23,8 +24,9 @@ use std::sync::atomic::AtomicBool;
 use std::sync::{Arc, PoisonError};
 
 use hardware::Berth;
+use hardware::host::ProcHost;
 use record::log::RunInfo;
-use runtime::{CannotRun, Control, Live, Options, Plan, Recorder, Registry, Report, Simulation};
+use runtime::{CannotRun, Control, Host, Live, Options, Plan, Recorder, Registry, Report, Simulation};
 use types::Duration;
 
 use crate::cli::{ClockChoice, RunArgs, Speed};
@@ -33,8 +35,10 @@ use crate::error::Failure;
 use crate::signals::Signals;
 use crate::{figures, file, terminal};
 use asked::Repeat;
+use burden::Burdens;
 
 pub(crate) use asked::Asked;
+pub(crate) use burden::{BurdenArgs, burden};
 pub(crate) use judge::{Facts, Judge, WORLD};
 pub(crate) use prepare::{ROBOT_KIND, Ready, Scenario};
 pub(crate) use recorder::{LogFile, choice};
@@ -171,8 +175,10 @@ impl One<'_> {
             },
             recorder,
             observer: Box::new(judge),
-            admission: Some(ready.admission(self.processors(), self.overhead(), self.args.force)),
-            processors: self.args.processors.map(usize::from),
+            admission: Some(ready.admission(self.processors(&ready), self.overhead(), self.args.force)),
+            processors: self.virtual_processors(&ready),
+            burdens: if self.clock == ClockChoice::Sim { file::burdens(&ready.plan) } else { Vec::new() },
+            host: (self.clock == ClockChoice::Wall).then(|| Box::new(ProcHost::new()) as Box<dyn Host>),
             parse: control::words::parse,
         };
         let report = self.play(&ready, &plan, &asked, options)?;
@@ -186,10 +192,16 @@ impl One<'_> {
         Ok(summary)
     }
 
+    /// On how many virtual processors steps take their time; nothing where they take none.
+    fn virtual_processors(&self, ready: &Ready) -> Option<usize> {
+        let said = self.args.processors.map(usize::from).or_else(|| file::processors(&ready.plan));
+        said.filter(|_| self.clock == ClockChoice::Sim)
+    }
+
     /// How many processors admission counts with: those that are played, or those of the machine.
-    fn processors(&self) -> usize {
+    fn processors(&self, ready: &Ready) -> usize {
         let there = || std::thread::available_parallelism().map_or(1, usize::from);
-        self.args.processors.map_or_else(there, usize::from)
+        self.virtual_processors(ready).unwrap_or_else(there)
     }
 
     /// What the runtime needs around a step: in simulated time nothing.
@@ -277,6 +289,9 @@ impl One<'_> {
     fn beside(&self, ready: &Ready, control: Control, asked: &Asked) -> Result<Beside, Failure> {
         Ok(Beside {
             server: if self.serves { serve::start(ready, &control, asked, self.clock) } else { None },
+            burdens: (self.clock == ClockChoice::Wall)
+                .then(|| Burdens::start(file::burdens(&ready.plan)))
+                .flatten(),
             screen: if self.watched { Some(screen::Screen::start(ready, control)?) } else { None },
         })
     }
@@ -304,12 +319,14 @@ impl One<'_> {
 
 /// What goes on beside a run. All of it ends with the run.
 struct Beside {
+    burdens: Option<Burdens>,
     server: Option<serve::Serving>,
     screen: Option<screen::Screen>,
 }
 
 impl Beside {
     fn end(self) {
+        drop(self.burdens);
         drop(self.server);
         drop(self.screen);
     }

@@ -2,6 +2,7 @@
 
 use types::cdr::{Error, Reader, Writer};
 use types::definition::{Definition, Kind};
+use types::header::Quality;
 use types::message::ros;
 use types::{AgentId, Category, Header, Priority, Time};
 
@@ -42,6 +43,7 @@ pub fn message_header() -> Definition {
             ("deadline_nanoseconds", Kind::I64),
             ("sender", Kind::U32),
             ("recipient", Kind::U32),
+            ("quality", Kind::U8),
         ],
     )
 }
@@ -66,7 +68,7 @@ pub(super) fn write_header(channel: u16, header: &Header, out: &mut Writer) {
     out.clear();
     out.put(channel).put(header.category as u8).put(header.priority as u8).put(header.marker);
     out.put(header.sequence).put(header.stamp.0).put(header.deadline.0);
-    out.put(header.sender.0).put(header.recipient.0);
+    out.put(header.sender.0).put(header.recipient.0).put(header.quality.0);
 }
 
 /// The channel that a header belongs to, and the header.
@@ -81,7 +83,12 @@ pub(super) fn read_header(cdr: &[u8]) -> Result<(u16, Header), Error> {
     let (marker, sequence) = (input.get()?, input.get()?);
     let (stamp, deadline) = (Time(input.get()?), Time(input.get()?));
     let (sender, recipient) = (AgentId(input.get()?), AgentId(input.get()?));
-    Ok((channel, Header { stamp, sequence, deadline, sender, recipient, marker, category, priority }))
+    // Logs of before it was there end here.
+    let quality = input.get().map_or(Quality::FULL, Quality);
+    Ok((
+        channel,
+        Header { stamp, sequence, deadline, sender, recipient, marker, category, priority, quality },
+    ))
 }
 
 pub(super) fn write_note(stamp: Time, severity: Severity, name: &str, text: &str, out: &mut Writer) {

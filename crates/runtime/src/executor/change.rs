@@ -15,6 +15,7 @@ use crate::allocations;
 use crate::context::Context;
 use crate::door::Door;
 use crate::handover::Running;
+use crate::means::Refining;
 use crate::os;
 use crate::port::{Envelope, InputEnd, OutputEnd, Rest, RouterEnd, Told, WireId};
 use crate::ring;
@@ -299,7 +300,7 @@ impl Core {
                 }
                 if let Some(mut new) = seat.take() {
                     self.due.forget(*slot);
-                    if new.timing.period > Duration::ZERO {
+                    if new.timing.period > Duration::ZERO && new.timing.means.is_active {
                         new.next_release = now;
                         self.push_release(now, *slot);
                     }
@@ -362,7 +363,8 @@ impl Core {
     fn set_timing(&mut self, slot: u32, timing: Timing, now: Time) {
         let Some(seat) = self.seats.get_mut(slot as usize).and_then(Option::as_mut) else { return };
         // A longer period holds at once, a shorter one from the next release on.
-        let next = if timing.period <= Duration::ZERO {
+        let goes_on = timing.means.is_active && !seat.timing.means.is_active;
+        let next = if timing.period <= Duration::ZERO || !timing.means.is_active {
             Time::NEVER
         } else if seat.next_release == Time::NEVER {
             now
@@ -378,8 +380,16 @@ impl Core {
             seat.put_off = Time::NEVER;
             self.ready.mark(slot);
         }
+        let alarm = if goes_on { seat.alarm } else { Time::NEVER };
         if next < Time::NEVER {
             self.push_release(next, slot);
+        }
+        if goes_on {
+            // What it asked for, and what came, before or while it was suspended.
+            if alarm < Time::NEVER {
+                self.push_release(alarm.max(now), slot);
+            }
+            self.find_whether_ready(slot);
         }
     }
 }
@@ -470,7 +480,14 @@ impl Visit<'_> {
             core.running.limit.store(seat.timing.hang_after.0 as u64, Ordering::Relaxed);
             core.running.since.store(os::ticks(), Ordering::Relaxed);
             core.running.agent.store(seat.id.0, Ordering::Relaxed);
-            let step = Step { now: self.now, deadline: self.now, agent: seat.id, period: seat.timing.period };
+            let step = Step {
+                now: self.now,
+                deadline: self.now,
+                agent: seat.id,
+                period: seat.timing.period,
+                method: usize::from(seat.timing.means.method),
+                refining: Refining::NONE,
+            };
             // From here on the core may be another thread's.
             let running = Arc::as_ptr(&core.running);
             core.running.begin(core.running.count().wrapping_add(1), slot);

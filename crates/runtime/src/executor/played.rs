@@ -6,7 +6,7 @@ use super::step::missed;
 use super::{Core, Job};
 use crate::context::Context;
 use crate::processor::Moment;
-use crate::stats::nanos;
+use crate::stats::{bump, nanos};
 
 impl Core {
     /// From now on whoever plays the processors counts the steps.
@@ -45,7 +45,13 @@ impl Core {
         self.mark_woken(context);
     }
 
+    /// How many refinements the last step of an agent made.
+    pub(crate) fn refined(&self, slot: u32) -> u32 {
+        self.seats.get(slot as usize).and_then(Option::as_deref).map_or(0, |seat| seat.refined)
+    }
+
     /// Counts a step that began at `begun`, ends now and used its processor for so long, where its agent is there still.
+    #[allow(clippy::too_many_arguments)]
     pub(crate) fn count_played(
         &mut self,
         context: &Context,
@@ -54,10 +60,14 @@ impl Core {
         begun: Time,
         now: Time,
         cost: Duration,
+        overran: bool,
     ) {
         let seat = self.seats.get(job.slot as usize).and_then(Option::as_deref);
         let Some(seat) = seat.filter(|seat| seat.id == of) else { return };
         seat.stats.exec.add(nanos(cost));
+        if overran {
+            bump(&seat.stats.overruns);
+        }
         seat.stats.response.add(nanos(now - job.release));
         if now > job.deadline {
             let (begun, ended) = (Moment::simulated(begun), Moment::simulated(now));

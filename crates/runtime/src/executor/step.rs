@@ -13,13 +13,15 @@ use std::ptr::NonNull;
 use std::sync::Arc;
 
 use types::Time;
+use types::header::Quality;
 
-use super::{Answer, Core, Ended, Job, RawCause, Seat, StepFault};
+use super::{Answer, Core, Ended, HEAVY, Job, RawCause, Seat, StepFault};
 use crate::agent::{Body, Fault, Step};
 use crate::allocations;
 use crate::context::Context;
 use crate::door::Door;
 use crate::handover::Running;
+use crate::means::Refining;
 use crate::os;
 use crate::port::Rest;
 use crate::processor::{Moment, Stopwatch, agrees, scaled};
@@ -34,6 +36,8 @@ enum Special {
     Start,
     /// It panics on request.
     Panic,
+    /// It takes several times as long, on request.
+    Heavy,
 }
 
 /// The step that is being made, as a thread knows it that has perhaps lost the core.
@@ -88,6 +92,8 @@ impl Core {
             deadline: job.deadline,
             agent: types::AgentId::NONE,
             period: types::Duration::ZERO,
+            method: 0,
+            refining: Refining::NONE,
         };
         let mut turn = Turn { job, step, body: None, checked: None, foreign: 0, in_start: 0 };
         // SAFETY: the caller owns the core, and others keep this, too, for as long as the thread lives; the borrow ends in this line.
@@ -146,7 +152,7 @@ impl Core {
             let body = unsafe { body.as_mut() };
             let result = match special {
                 Special::Nothing => body.step(&mut turn.step),
-                special => unusual(special, body, turn, before),
+                special => unusual(special, body, turn, before, watch.is_some()),
             };
             let used = allocations::so_far() - before;
             *at = now(watch, begun);
@@ -226,10 +232,20 @@ impl Core {
         if turn.job.by_clock {
             seat.stats.jitter.add(nanos(begun.time - turn.job.release));
         }
-        turn.step =
-            Step { now: begun.time, deadline: turn.job.deadline, agent: seat.id, period: seat.timing.period };
+        turn.step = Step {
+            now: begun.time,
+            deadline: turn.job.deadline,
+            agent: seat.id,
+            period: seat.timing.period,
+            method: 0,
+            refining: Refining::NONE,
+        };
         turn.body = Some(body);
         context.begin(seat.id, begun.time);
+        if !seat.timing.means.is_plain() {
+            let clock = watch.map(|_| (begun.reading.ticks, self.rate));
+            seat.choose(context, &mut turn.step, clock);
+        }
         if seat.serves {
             seat.begin_serving();
         }
@@ -294,6 +310,9 @@ impl Core {
         watch: Option<&Stopwatch<'_>>,
     ) -> Option<Time> {
         seat.in_step = false;
+        if context.quality() != Quality::FULL || turn.step.refining.count > 0 || seat.refined > 0 {
+            seat.note_quality(context, turn, begun, ended, watch.is_some(), self.rate);
+        }
         let alarm = context.end();
         self.mark_woken(context);
         if self.ready_since.is_some() {
@@ -431,6 +450,38 @@ impl Seat {
         self.body.take()
     }
 
+    /// Says how the step shall be done, and for how long.
+    #[inline(never)]
+    fn choose(&self, context: &Context, step: &mut Step, clock: Option<(u64, u64)>) {
+        let mut means = self.timing.means;
+        if self.fault == StepFault::Heavy {
+            (means.cost, means.refinement) = (means.cost * HEAVY, means.refinement * HEAVY);
+        }
+        step.method = usize::from(means.method);
+        step.refining = Refining::of(&means, step.now, step.deadline, clock);
+        context.set_quality(means.quality);
+    }
+
+    /// Keeps what the step says of its result.
+    #[inline(never)]
+    fn note_quality(
+        &mut self,
+        context: &Context,
+        turn: &Turn,
+        begun: Moment,
+        ended: Moment,
+        on_the_wall: bool,
+        rate: u64,
+    ) {
+        bump_by(&self.stats.quality_lost, u64::from(u8::MAX - context.quality().0));
+        self.refined = turn.step.refining.count;
+        bump_by(&self.stats.refinements, u64::from(self.refined));
+        let own = scaled(begun.reading.own(&ended.reading), rate);
+        if on_the_wall && self.refined > 0 && own > nanos(self.timing.means.budget) {
+            bump(&self.stats.overruns);
+        }
+    }
+
     /// What is special about the step that comes; or the step is left out.
     #[cold]
     fn prepare(&mut self, slot: u32) -> Result<Special, Ended> {
@@ -443,21 +494,40 @@ impl Seat {
                 self.fault = StepFault::None;
                 return Err(Ended::AskedToHang(slot));
             }
-            StepFault::None | StepFault::Panic | StepFault::Slow => {}
+            StepFault::None | StepFault::Panic | StepFault::Slow | StepFault::Heavy => {}
         }
         let first = !core::mem::replace(&mut self.started, true);
         if self.fault == StepFault::Panic {
             self.fault = StepFault::None;
             return Ok(Special::Panic);
         }
-        Ok(if first { Special::Start } else { Special::Nothing })
+        Ok(match self.fault {
+            _ if first => Special::Start,
+            StepFault::Heavy => Special::Heavy,
+            _ => Special::Nothing,
+        })
     }
 }
 
 #[cold]
-fn unusual(special: Special, body: &mut dyn Body, turn: &mut Turn, before: u64) -> Result<(), Fault> {
+fn unusual(
+    special: Special,
+    body: &mut dyn Body,
+    turn: &mut Turn,
+    before: u64,
+    on_the_wall: bool,
+) -> Result<(), Fault> {
     if special == Special::Panic {
         panic!("asked to panic");
+    }
+    if special == Special::Heavy {
+        let begun = os::ticks();
+        let done = body.step(&mut turn.step);
+        let over = begun + (os::ticks() - begun) * HEAVY as u64;
+        while on_the_wall && os::ticks() < over {
+            core::hint::spin_loop();
+        }
+        return done;
     }
     let started = body.start(&mut turn.step);
     turn.in_start = allocations::so_far() - before;

@@ -465,7 +465,7 @@ impl<T: Message> Port for Input<T> {
     }
 
     fn create(&self, _: &PortOptions, _: usize) -> PortEnds {
-        PortEnds { input: Some(input_core::<T>()), output: None }
+        PortEnds { input: Some(input_core::<T>()), ..PortEnds::default() }
     }
 
     fn bind(&mut self, ends: &PortEnds) {

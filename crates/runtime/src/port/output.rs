@@ -12,6 +12,7 @@ use std::sync::Arc;
 
 use types::cdr::NoElement;
 use types::chance::Stream;
+use types::header::Quality;
 use types::message::is_large;
 use types::{AgentId, Category, Header, Message, Priority, Time};
 
@@ -252,10 +253,10 @@ impl Default for Envelope {
 impl Envelope {
     /// Fills in a header, word by word: one that is put together elsewhere and copied takes longer than a small payload.
     #[inline(always)]
-    fn put(&self, header: &mut Header, stamp: Time, sequence: u64, sender: AgentId) {
+    fn put(&self, header: &mut Header, stamp: Time, sequence: u64, sender: AgentId, quality: Quality) {
         (header.stamp, header.sequence, header.deadline) = (stamp, sequence, self.deadline);
         (header.sender, header.recipient, header.marker) = (sender, self.recipient, self.marker);
-        (header.category, header.priority) = (self.category, self.priority);
+        (header.category, header.priority, header.quality) = (self.category, self.priority, quality);
     }
 }
 
@@ -375,6 +376,7 @@ impl<T: Message> OutputCore<T> {
             None => context.map_or(Time::ZERO, Context::now),
         };
         let (sequence, sender) = (inner.sequence, inner.sender);
+        let quality = context.map_or(Quality::FULL, Context::quality);
         inner.sequence += 1;
         self.sent.store(inner.sequence, Ordering::Relaxed);
         if inner.is_plain
@@ -385,7 +387,7 @@ impl<T: Message> OutputCore<T> {
                 && let Way::Value(ring) = &mut route.way
             {
                 let pushed = ring.push(|parcel| {
-                    envelope.put(&mut parcel.header, stamp, sequence, sender);
+                    envelope.put(&mut parcel.header, stamp, sequence, sender, quality);
                     fill(&mut parcel.payload, &mut []);
                 });
                 return route.account(pushed, Sent::default(), context);
@@ -397,16 +399,17 @@ impl<T: Message> OutputCore<T> {
                 let Some(mut loan) = memory.loan() else { return Sent::default() };
                 let (head, row) = loan.parts();
                 let len = fill(head, row);
-                let link = loan.publish(len, |header| envelope.put(header, stamp, sequence, sender));
+                let link = loan.publish(len, |header| envelope.put(header, stamp, sequence, sender, quality));
                 let pushed = ring.push(|parcel| {
-                    envelope.put(&mut parcel.header, stamp, sequence, sender);
+                    envelope.put(&mut parcel.header, stamp, sequence, sender, quality);
                     parcel.payload = link;
                 });
                 return route.account(pushed, Sent::default(), context);
             }
         }
         let Envelope { deadline, recipient, marker, category, priority, .. } = envelope;
-        let header = Header { stamp, sequence, deadline, sender, recipient, marker, category, priority };
+        let header =
+            Header { stamp, sequence, deadline, sender, recipient, marker, category, priority, quality };
         self.send_any(&header, fill, context)
     }
 
@@ -604,7 +607,7 @@ impl<T: Message> Port for Output<T> {
     }
 
     fn create(&self, options: &PortOptions, seats: usize) -> PortEnds {
-        PortEnds { input: None, output: Some(output_core::<T>(options, seats)) }
+        PortEnds { output: Some(output_core::<T>(options, seats)), ..PortEnds::default() }
     }
 
     fn bind(&mut self, ends: &PortEnds) {

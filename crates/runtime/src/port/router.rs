@@ -659,7 +659,7 @@ impl Port for Router {
     }
 
     fn create(&self, _: &PortOptions, _: usize) -> PortEnds {
-        PortEnds { input: Some(Arc::new(RouterEnd::new())), output: None }
+        PortEnds { input: Some(Arc::new(RouterEnd::new())), ..PortEnds::default() }
     }
 
     fn bind(&mut self, ends: &PortEnds) {

@@ -5,7 +5,7 @@ use std::collections::HashMap;
 use schedule::Exact;
 use schedule::sensitivity::largest;
 use schedule::system::{Found, Source, System};
-use types::Duration;
+use types::{Duration, Time};
 
 use super::{Incident, Reply, Router};
 use crate::plan::{AgentPlan, Plan};
@@ -28,7 +28,13 @@ pub struct Admission {
 /// After so many steps what was measured counts, and not what was declared.
 const MEASURED_AFTER: u64 = 1000;
 /// The next step may take longer than all before it: by a fifth.
-const MARGIN_PERCENT: i64 = 120;
+pub(crate) const WITH_MARGIN: i64 = 120;
+/// Steps that are played take what they are said to take.
+pub(crate) const AS_PLAYED: i64 = 100;
+/// What was measured longer ago than twice this does not count.
+const WINDOW: Duration = Duration::secs(10);
+/// How often it is looked whether somebody has outgrown what it was admitted with.
+const GROWN_EVERY: Duration = Duration::millis(50);
 
 /// A system and what the analysis found of it.
 pub(super) struct Judged {
@@ -102,9 +108,13 @@ impl Router {
     }
 
     /// What the analysis says of the system as it is; nothing where nobody asks.
-    pub(super) fn judged(&self) -> Reply<Option<Judged>> {
+    pub(super) fn judged(&mut self) -> Reply<Option<Judged>> {
+        if self.admission.is_none() {
+            return Ok(None);
+        }
+        self.look_at_windows();
         let Some(Admission { processors, overhead, pace, .. }) = &self.admission else { return Ok(None) };
-        let parts = self.to_plan();
+        let parts = self.to_plan_as_it_is();
         let plan = Plan {
             agents: parts.0,
             queues: parts.1,
@@ -125,22 +135,62 @@ impl Router {
         Ok(Some(Judged { names, system, found }))
     }
 
-    /// Processor time of a step at worst: what was measured, once enough was, else what is declared.
+    /// Brings up to date what real-time agents took of late.
+    fn look_at_windows(&mut self) {
+        if self.measures.is_none() {
+            return;
+        }
+        let now = self.now;
+        for known in self.agents.values_mut() {
+            if self.executors[known.executor].plan.level().is_some() {
+                known.long_window.look(&known.stats, now, WINDOW);
+            }
+        }
+    }
+
+    /// Processor time of a step at worst: what was measured of late, once enough was, else what is declared. The budget of an anytime agent
+    /// counts whole: it may use it.
     fn cost_of(&self, agent: &AgentPlan) -> Duration {
         let known = self.names.get(&agent.name).and_then(|id| self.agents.get(id));
-        let measured = known
-            .map(|known| known.stats.longest())
-            .filter(|(steps, _)| self.measures && *steps >= MEASURED_AFTER);
-        match (measured, agent.cost) {
-            (Some((_, longest)), _) => Duration(longest.0 * MARGIN_PERCENT / 100),
-            (None, Some(declared)) => declared,
-            (None, None) => Duration::ZERO,
+        let methods = self.registry.get(&agent.kind).map_or(&[][..], |kind| kind.methods);
+        let declared = agent.cost_in_all(methods).unwrap_or(Duration::ZERO);
+        let Some((known, percent)) = known.zip(self.measures) else { return declared };
+        if known.long_window.steps(&known.stats) < MEASURED_AFTER {
+            return declared;
+        }
+        let longest = known.long_window.longest(&known.stats);
+        Duration(longest.0 * percent / 100).max(agent.budget.unwrap_or(Duration::ZERO))
+    }
+
+    /// Tells whose steps take longer than what they were admitted with, at once and then each time when it has become a quarter more.
+    pub(super) fn note_outgrown(&mut self, now: Time) {
+        if self.measures.is_none() || self.admission.is_none() || now - self.grown_at < GROWN_EVERY {
+            return;
+        }
+        self.grown_at = now;
+        let mut grown = Vec::new();
+        for known in self.agents.values_mut() {
+            let Some(admitted) = known.admitted.filter(|admitted| *admitted > Duration::ZERO) else {
+                continue;
+            };
+            let (_, longest) = known.stats.longest();
+            if longest > admitted {
+                known.admitted = Some(longest + Duration(longest.0 / 4));
+                grown.push((known.plan.name.clone(), longest, admitted));
+            }
+        }
+        for (agent, longest, admitted) in grown {
+            let millis = |span: Duration| format!("{:.3} ms", span.0 as f64 * 1e-6);
+            let what =
+                format!("its step took {}, and it was admitted with {}", millis(longest), millis(admitted));
+            self.incidents.push(Incident { time: now, agent, what });
         }
     }
 
     /// Tells what was admitted though it does not fit.
     pub(crate) fn note_forced(&mut self) {
-        if let Err(refusal) = self.admit(None, None) {
+        let refused = self.admit(None, None);
+        if let Err(refusal) = refused {
             let what = format!("admitted by force: {}", refusal.what);
             self.incidents.push(Incident { time: self.now, agent: "control".into(), what });
         }
@@ -155,13 +205,25 @@ impl Router {
         self.admit(None, None)
     }
 
+    /// Keeps what agents were counted with; who has been told to have outgrown it stays as it is.
+    fn note_admitted(&mut self, judged: &Judged) {
+        let Some(Admission { overhead, .. }) = &self.admission else { return };
+        let overhead = *overhead;
+        for (name, agent) in judged.names.iter().zip(&judged.system.agents) {
+            let cost = Duration(agent.cost.to_integer() as i64) - overhead;
+            let Some(known) = self.names.get(name).and_then(|id| self.agents.get_mut(id)) else { continue };
+            known.admitted = known.admitted.or(Some(cost));
+        }
+    }
+
     /// Refuses what was staged where somebody misses its deadline by it who met it before.
-    pub(super) fn admit(&self, before: Option<&Judged>, request: Option<&str>) -> Reply<()> {
+    pub(super) fn admit(&mut self, before: Option<&Judged>, request: Option<&str>) -> Reply<()> {
         let Some(judged) = self.judged()? else { return Ok(()) };
         let late =
             |at: &usize| judged.misses(*at) && before.is_none_or(|before| !before.miss(&judged.names[*at]));
         let late: Vec<usize> = (0..judged.names.len()).filter(late).collect();
         if late.is_empty() {
+            self.note_admitted(&judged);
             return Ok(());
         }
         let said: Vec<String> = late.iter().take(3).map(|at| judged.said(*at)).collect();
@@ -189,7 +251,7 @@ pub(super) fn changes_timing(request: &Request) -> Option<&str> {
     match request {
         Request::Add(plan) => Some(&plan.name),
         Request::Set { agent, key, .. }
-            if matches!(key.as_str(), "period" | "deadline" | "min_gap" | "cost") =>
+            if key != "importance" && super::TIMING_KEYS.contains(&key.as_str()) =>
         {
             Some(agent)
         }

@@ -4,16 +4,17 @@ use std::collections::BTreeSet;
 use std::sync::Arc;
 
 use types::value::Table;
-use types::{AgentId, Duration, Name, Time};
+use types::{AgentId, Name, Time};
 
 use super::script::{Step, What};
-use super::{Known, Reply, Rings, Router, SPARE_SEATS, Staged, Wire, first, robot_wires, timing_of};
+use super::timing::{Nominal, TIMING_KEYS};
+use super::{Known, Reply, Rings, Router, SPARE_SEATS, Staged, Wire, first, robot_wires, timing_as};
 use crate::agent::{AgentType, Body};
 use crate::executor::{Change, Seat, StepFault};
 use crate::plan::{AgentPlan, WirePlan};
 use crate::port::{Envelope, OutputFault, PortEnds, WireId};
 use crate::request::{AgentState, FaultKind, Refusal};
-use crate::stats::AgentStats;
+use crate::stats::{AgentStats, Window};
 
 impl Router {
     /// Adds an agent. `readers` is how many wires the plan leads from each of its ports.
@@ -31,7 +32,7 @@ impl Router {
             .clone();
         let (_, params) = kind.read_params(&plan.params).map_err(first)?;
         let mut body = kind.build(&plan.params).map_err(first)?;
-        let timing = timing_of(&plan)?;
+        let timing = timing_as(&plan, &kind)?;
         let executor = self.executor_for(&plan, timing)?;
         self.check_budget(&plan, &timing, executor)?;
         let ends = new_ends(&plan, &kind, body.as_mut(), readers)?;
@@ -65,6 +66,10 @@ impl Router {
             wires: BTreeSet::new(),
             ends,
             stats: Arc::new(AgentStats::default()),
+            window: Window::default(),
+            long_window: Window::default(),
+            admitted: None,
+            nominal: Nominal::of(&plan),
             timing,
             fault: StepFault::None,
             output_faults: vec![OutputFault::None; ports],
@@ -107,6 +112,7 @@ impl Router {
             is_due: false,
             alarm: Time::NEVER,
             put_off: Time::NEVER,
+            refined: 0,
             last_step: Time(i64::MIN / 2),
             started: false,
             fault: known.fault,
@@ -257,16 +263,18 @@ impl Router {
     }
 
     /// Changes what is known of an agent, so that it can be taken back.
-    fn alter(&mut self, id: AgentId, staged: &mut Staged, change: impl FnOnce(&mut Known)) {
+    pub(super) fn alter(&mut self, id: AgentId, staged: &mut Staged, change: impl FnOnce(&mut Known)) {
         let Some(known) = self.agents.get_mut(&id) else { return };
         let (kind, plan, params, timing) =
             (known.kind.clone(), known.plan.clone(), known.params.clone(), known.timing);
+        let nominal = known.nominal.clone();
         let (fault, output_faults) = (known.fault, known.output_faults.clone());
         change(known);
         staged.undo(move |router| {
             router.of_mut(id, |known| {
                 known.spare = kind.build(&params).ok();
                 (known.kind, known.plan, known.params, known.timing) = (kind, plan, params, timing);
+                known.nominal = nominal;
                 (known.fault, known.output_faults) = (fault, output_faults);
             });
         });
@@ -280,7 +288,7 @@ impl Router {
         staged: &mut Staged,
     ) -> Reply<()> {
         let id = self.id_of(name)?;
-        if matches!(key, "period" | "deadline" | "min_gap" | "cost") {
+        if TIMING_KEYS.contains(&key) {
             return self.set_timing(id, key, &value, staged);
         }
         let known = &self.agents[&id];
@@ -295,42 +303,6 @@ impl Router {
             known.params = table;
             known.spare = spare;
         });
-        Ok(())
-    }
-
-    fn set_timing(
-        &mut self,
-        id: AgentId,
-        key: &str,
-        value: &types::value::Value,
-        staged: &mut Staged,
-    ) -> Reply<()> {
-        let text = value
-            .as_text()
-            .ok_or_else(|| Refusal::new(format!("{key} must be a time such as \"250ms\", not {value}")))?;
-        let span: Duration =
-            text.parse().map_err(|error| Refusal::new(format!("{key} is \"{text}\": {error}")))?;
-        let known = &self.agents[&id];
-        let mut plan = known.plan.clone();
-        match key {
-            "period" => plan.period = Some(span),
-            "deadline" => plan.deadline = Some(span),
-            "cost" => plan.cost = Some(span),
-            _ => plan.min_gap = span,
-        }
-        if let (Some(period), Some((least, most))) = (plan.period, plan.period_range)
-            && !(least..=most).contains(&period)
-        {
-            return Err(Refusal::new(format!(
-                "the period of {} must lie from {least} to {most}, not {period}",
-                plan.name
-            )));
-        }
-        let timing = timing_of(&plan)?;
-        self.check_budget(&plan, &timing, known.executor)?;
-        let change = Change::Timing { slot: known.slot, timing };
-        staged.step(Step { executor: known.executor, of: id, ring: None, what: What::Change(change) });
-        self.alter(id, staged, move |known| (known.plan, known.timing) = (plan, timing));
         Ok(())
     }
 

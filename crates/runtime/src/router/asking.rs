@@ -65,6 +65,7 @@ impl Asking {
 impl Router {
     /// Takes in the ends of an agent that is new, or has new ones, before anybody else has them.
     pub(super) fn acquaint(&mut self, id: AgentId) {
+        self.acquaint_manager(id);
         let Some(known) = self.agents.get(&id) else { return };
         let ends = known.ends.iter().enumerate();
         let ends: Vec<(usize, Arc<RouterEnd>)> =
@@ -87,6 +88,7 @@ impl Router {
     /// The agent is gone, and nobody waits for what it asked.
     pub(super) fn dismiss(&mut self, id: AgentId) {
         self.asking.askers.retain(|(agent, _), _| *agent != id);
+        self.dismiss_manager(id);
     }
 
     /// Another instance of the agent has seen nothing yet.

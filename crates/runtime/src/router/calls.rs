@@ -218,7 +218,9 @@ impl Router {
         let (id, port) = under_way.service;
         let Some(known) = self.by_id(id) else { return };
         let (executor, slot) = (known.executor, known.slot);
-        let PortEnds { input: Some(input), output: Some(output) } = known.ends[port].clone() else { return };
+        let PortEnds { input: Some(input), output: Some(output), .. } = known.ends[port].clone() else {
+            return;
+        };
         let into = output.forgetting_box();
         let forget = Change::Forget { end: output, wire: under_way.answer, into, slot };
         let cut = Cut {

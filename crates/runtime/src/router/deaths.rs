@@ -25,6 +25,7 @@ impl Router {
     pub(crate) fn supervise(&mut self, now: Time, fabric: &mut dyn Fabric) -> Time {
         self.now = now;
         self.take_answers();
+        self.note_outgrown(now);
         let mut next = Time::NEVER;
         if self.restarting > 0 {
             next = self.restart_who_is_due();

@@ -4,6 +4,7 @@ use types::Time;
 
 use super::admission::changes_timing;
 use super::{Fabric, OutsideCall, Reply, Router, Staged, timing_of};
+use crate::census::Given;
 use crate::plan::WirePlan;
 use crate::request::{Refusal, Request};
 
@@ -16,15 +17,34 @@ impl Router {
         self.now = now;
         let mut concerned = Vec::new();
         self.concerned(&request, &mut concerned);
+        self.carry_out(concerned, fabric, |router, staged| match request {
+            Request::Forced(request) => router.stage(*request, staged).map(|()| router.note_forced()),
+            request => router.stage_admitted(request, staged),
+        })
+    }
+
+    /// Sets all that a resource manager says, or nothing.
+    pub(super) fn apply_given(&mut self, given: &[Given], now: Time, fabric: &mut dyn Fabric) -> Reply<()> {
+        self.now = now;
+        let of = |given: &Given| self.owner_of(&given.agent).map(|known| known.executor);
+        let concerned = given.iter().filter_map(of).collect();
+        self.carry_out(concerned, fabric, |router, staged| {
+            given.iter().try_for_each(|given| router.set_given(given, staged))
+        })
+    }
+
+    /// Stages something, and does it where all executors concerned answer and nothing is against it.
+    fn carry_out(
+        &mut self,
+        mut concerned: Vec<usize>,
+        fabric: &mut dyn Fabric,
+        stage: impl FnOnce(&mut Router, &mut Staged) -> Reply<()>,
+    ) -> Reply<()> {
         concerned.sort_unstable();
         concerned.dedup();
         self.ask_all(&concerned, fabric)?;
         let mut staged = Staged::default();
-        let done = match request {
-            Request::Forced(request) => self.stage(*request, &mut staged).map(|()| self.note_forced()),
-            request => self.stage_admitted(request, &mut staged),
-        };
-        match done {
+        match stage(self, &mut staged) {
             Ok(()) => {
                 let script = self.decide(staged);
                 self.finish(script, fabric);

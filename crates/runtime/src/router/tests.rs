@@ -106,7 +106,7 @@ impl World {
         plan.wires = [("a.go", "b.come"), ("b.go", "c.come"), ("a.kept", "c.come"), ("b.ask", "c.answer")]
             .map(|(from, to)| WirePlan::new(from, to))
             .into();
-        let built = build(&plan, &registry![Both], &Options::default(), Time::ZERO).unwrap();
+        let built = build(&plan, &registry![Both], &mut Options::default(), Time::ZERO).unwrap();
         let context = Context::new(None, built.directory);
         World { router: built.router, cores: built.cores, context, now: Time::ZERO }
     }

@@ -5,10 +5,11 @@
 
 use std::sync::Arc;
 
-use schedule::processors::{ANYWHERE, Mask, Processors};
+use schedule::processors::Processors;
 use types::{AgentId, Duration, Time};
 
 use super::Player;
+use crate::census::{Burden, Foreign, HostReading, mask_of};
 use crate::executor::{Ended, Job};
 use crate::plan::ExecutorPlan;
 use crate::port::OutputEnd;
@@ -18,6 +19,10 @@ use crate::system::CannotRun;
 pub(super) struct Busy {
     processors: Processors,
     doing: Vec<Doing>,
+    /// What else takes time of them, as threads behind those of the executors, and when each has more to do.
+    burdens: Vec<(Burden, Time)>,
+    /// Since when what ran where has not been told.
+    told: Time,
 }
 
 #[derive(Default)]
@@ -34,22 +39,88 @@ struct Played {
     of: AgentId,
     begun: Time,
     cost: Duration,
+    /// Whether it takes longer than its budget for refinements.
+    overran: bool,
 }
 
 /// A step that never ends.
 const FOR_EVER: i128 = i128::MAX >> 8;
 
 impl Busy {
-    /// So many processors for these executors.
-    pub(super) fn new<'a>(count: usize, executors: impl Iterator<Item = &'a ExecutorPlan>) -> Busy {
+    /// So many processors for these executors, and for what else burdens them. What runs where is kept where somebody wants to be `told`.
+    pub(super) fn new<'a>(
+        count: usize,
+        executors: impl Iterator<Item = &'a ExecutorPlan>,
+        burdens: Vec<Burden>,
+        told: bool,
+    ) -> Busy {
         let mut processors = Processors::new(count);
+        if told {
+            processors = processors.recording();
+        }
         let mut doing = Vec::new();
         for executor in executors {
-            let may = executor.cpus.iter().fold(0, |may, cpu| may | Mask::from(1u8) << (cpu & 63));
-            processors.thread(if may == 0 { ANYWHERE } else { may });
+            processors.thread(mask_of(&executor.cpus));
             doing.push(Doing::default());
         }
-        Busy { processors, doing }
+        for burden in &burdens {
+            processors.thread(mask_of(&burden.cpus));
+        }
+        let begins = |burden: Burden| {
+            let first = Time::ZERO + burden.from;
+            (burden, first)
+        };
+        Busy { processors, doing, burdens: burdens.into_iter().map(begins).collect(), told: Time::ZERO }
+    }
+
+    /// When a burden has more to do.
+    pub(super) fn next_burden(&self) -> Time {
+        self.burdens.iter().map(|(_, next)| *next).min().unwrap_or(Time::NEVER)
+    }
+
+    /// Gives burdens what they have to do now. One that is not done with the last yet passes over it.
+    fn burden(&mut self, now: Time) {
+        for (place, (burden, next)) in self.burdens.iter_mut().enumerate() {
+            if *next > now {
+                continue;
+            }
+            let thread = self.doing.len() + place;
+            if !self.processors.is_busy(thread) {
+                self.processors.submit(thread, -i128::from(burden.priority), burden.work().0.into());
+            }
+            *next = *next + burden.period.max(Duration(1));
+            if *next - Time::ZERO >= burden.until {
+                *next = Time::NEVER;
+            }
+        }
+    }
+
+    /// What ran where since this was asked last.
+    pub(super) fn reading(&mut self, now: Time) -> HostReading {
+        let length = (now - self.told).0 as f64;
+        self.told = now;
+        let mut processors = vec![0.0; self.processors.count()];
+        let mut burdens = vec![0.0; self.burdens.len()];
+        for ran in self.processors.ran() {
+            let share = (ran.to - ran.from) as f64 / length.max(1.0);
+            processors[ran.processor] += share;
+            if let Some(place) = ran.thread.checked_sub(self.doing.len()) {
+                burdens[place] += share;
+            }
+        }
+        let foreign = self.burdens.iter().zip(&burdens).filter(|(_, share)| **share > 0.0);
+        let foreign = foreign.map(|((burden, _), share)| Foreign {
+            name: burden.name.clone(),
+            priority: burden.priority,
+            may: mask_of(&burden.cpus),
+            share: *share as f32,
+        });
+        HostReading {
+            processors: processors.into_iter().map(|share: f64| share as f32).collect(),
+            foreign: burdens.iter().sum::<f64>() as f32,
+            burdens: foreign.collect(),
+            ..HostReading::default()
+        }
     }
 
     /// When the next of the steps ends that are under way, as far as nothing comes between.
@@ -75,7 +146,9 @@ impl Player {
         let now = i128::from(self.now.0);
         for _ in 0..most {
             let ended = busy.processors.advance(now).to_vec();
-            for at in &ended {
+            busy.burden(self.now);
+            let executors = busy.doing.len();
+            for at in ended.iter().filter(|at| **at < executors) {
                 self.end(busy, *at);
             }
             for at in self.order.clone() {
@@ -93,7 +166,7 @@ impl Player {
                 return Ok(());
             }
             begun.sort_by_key(|at| self.order.iter().position(|place| place == at));
-            for at in begun {
+            for at in begun.into_iter().filter(|at| *at < executors) {
                 self.begin(busy, at);
             }
         }
@@ -114,11 +187,14 @@ impl Player {
 
     fn begin(&mut self, busy: &mut Busy, at: usize) {
         let Some(job) = self.cores[at].next_played(self.now) else { return };
-        let (of, outputs, cost) = self.router.played(at, job.slot);
-        outputs.iter().for_each(|output| output.hold());
+        let Some(played) = self.router.played(at, job.slot) else { return };
+        played.outputs.iter().for_each(|output| output.hold());
         let ended = self.step(at, job);
+        let refined = self.cores[at].refined(job.slot);
+        let (of, cost) = (played.of, played.cost + played.refinement * i64::from(refined));
+        let overran = refined > 0 && cost > played.budget;
         let doing = &mut busy.doing[at];
-        doing.outputs = outputs;
+        doing.outputs = played.outputs;
         match ended {
             Some(Ended::AskedToHang(slot)) => {
                 busy.processors.costs(at, FOR_EVER);
@@ -126,7 +202,7 @@ impl Player {
             }
             Some(Ended::Normally) => {
                 busy.processors.costs(at, cost.0.into());
-                doing.step = Some(Played { job, of, begun: self.now, cost });
+                doing.step = Some(Played { job, of, begun: self.now, cost, overran });
             }
             Some(Ended::NotRun) | None => {}
         }
@@ -150,8 +226,8 @@ impl Player {
             self.context.end();
             self.cores[at].mark_woken_by(&self.context);
         }
-        if let Some(Played { job, of, begun, cost }) = step {
-            self.cores[at].count_played(&self.context, job, of, begun, self.now, cost);
+        if let Some(Played { job, of, begun, cost, overran }) = step {
+            self.cores[at].count_played(&self.context, job, of, begun, self.now, cost, overran);
         }
     }
 }

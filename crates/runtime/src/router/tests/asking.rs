@@ -43,7 +43,7 @@ fn agent(name: &str, executor: &str) -> AgentPlan {
 fn world() -> World {
     let mut plan = Plan::new("world");
     plan.agents = vec![agent("a", "reflex"), agent("b", "control"), agent("c", "vision")];
-    let built = crate::system::build(&plan, &registry![Asks], &Options::default(), Time::ZERO).unwrap();
+    let built = crate::system::build(&plan, &registry![Asks], &mut Options::default(), Time::ZERO).unwrap();
     let context = crate::context::Context::new(None, built.directory);
     World { router: built.router, cores: built.cores, context, now: Time::ZERO }
 }
