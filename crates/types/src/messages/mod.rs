@@ -4,12 +4,16 @@ mod body;
 mod command;
 mod decision;
 mod image;
+mod path;
 mod pose;
 mod ranges;
+mod sighting;
 
 pub use body::{Battery, Bumper, Gyro, Head, WheelTicks};
 pub use command::{Amount, Direction, Drive, Offer, Twist, Verb, Word};
 pub use decision::{Decision, Row, Safety, Target};
 pub use image::{Encoding, Image};
+pub use path::{Path, WAYPOINTS, Waypoint};
 pub use pose::{FrameTransform, Odometry, Transforms};
 pub use ranges::{DIRECTIONS, Echo, Echoes, LaserScan, Ranges, Risk};
+pub use sighting::Sighting;
