@@ -9,6 +9,8 @@
 //! | [`blobs`] | mask | connected regions with area, centre, box and orientation |
 //! | [`edges`] | intensity picture | strength of the edges |
 //! | [`motion`] | two intensity pictures | mask, number and centre of the changed pixels |
+//! | [`recognise`] | picture, colour and shape | the largest region that has both, from all pixels or some |
+//! | [`thin`] | picture | every n-th pixel of it, and regions of those in the whole |
 //! | [`target`] | blob and camera | bearing, elevation, share of the picture |
 //! | [`sonar`] | ring of ranges | filtered ranges, risk per direction |
 //! | [`local_map`] | echoes while the robot moves | where something is around it |
@@ -23,9 +25,11 @@ mod lead;
 pub mod local_map;
 pub mod motion;
 pub mod picture;
+pub mod recognise;
 pub mod sonar;
 mod split;
 pub mod target;
+pub mod thin;
 
 pub use picture::{Size, WrongLength};
 

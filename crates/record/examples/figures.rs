@@ -5,8 +5,8 @@ use std::f64::consts::PI;
 use std::path::PathBuf;
 
 use record::figure::{
-    AgentTiming, Band, Drawing, Event, Map, PeriodRow, Periods, Picture, Region, Series, Timing, Trajectory,
-    Velocity, Waypoint,
+    AgentTiming, Band, BandRow, Bands, Drawing, Event, Map, PeriodRow, Periods, Picture, RateBand, Region,
+    Series, Span, Timing, Trajectory, Velocity, Waypoint,
 };
 use types::geometry::{Point, Pose, wrap};
 
@@ -14,11 +14,12 @@ fn main() -> Result<(), Box<dyn Error>> {
     let folder = PathBuf::from(std::env::args().nth(1).ok_or("name a folder for the figures")?);
     std::fs::create_dir_all(&folder)?;
     let way = drive();
-    let figures: [(&str, Picture); 5] = [
+    let figures: [(&str, Picture); 6] = [
         ("trajectory", trajectory(&way).draw()),
         ("velocity", velocity(&way).draw()),
         ("timing", timing().draw()),
         ("periods", periods().draw()),
+        ("bands", bands_of_runs().draw()),
         ("map", map(&way).draw()),
     ];
     for (name, picture) in figures {
@@ -255,6 +256,48 @@ fn periods() -> Periods {
             row("decision", &|_| 0.25, 0.012, 60),
         ],
         window: None,
+    }
+}
+
+/// Three runs of eight agents: in the first all keep their rates and miss, in the second all give way, in the third some rest.
+fn bands_of_runs() -> Bands {
+    let load = |t: f64| if (30.0..70.0).contains(&t) { 1.0 } else { 0.0 };
+    let names =
+        ["safety", "sonar", "wall-follower", "camera", "image-tracker", "face", "path-planner", "decision"];
+    let row = |run: usize, i: usize| {
+        let misses: Vec<f64> = (0..600)
+            .filter(|k| {
+                let chance = (noise(k * 8 + i + run * 5000) + 1.0) / 2.0;
+                i > 2 && chance < load(*k as f64 * 0.2) * [0.4, 0.02, 0.004][run] * (i as f64 / 4.0)
+            })
+            .map(|k| k as f64 * 0.2)
+            .collect();
+        let lower = 1.0 - 0.11 * i as f64;
+        let rate = match (run, i) {
+            (1, 2..) => vec![(0.0, 1.0), (30.5, lower), (52.0, 0.8 * lower), (71.0, 1.0)],
+            (2, 5 | 6) => vec![(0.0, 1.0), (32.0, 0.0), (74.0, 0.5), (80.0, 1.0)],
+            (2, 3..) => vec![(0.0, 1.0), (31.0, 0.5), (72.0, 1.0)],
+            _ => vec![(0.0, 1.0)],
+        };
+        let rests = run == 2 && matches!(i, 5 | 6);
+        BandRow {
+            name: names[i].into(),
+            said: format!("{:.1} %, {}", 100.0 - misses.len() as f64 / 6.0, misses.len()),
+            suspended: if rests { vec![(32.0, 74.0)] } else { Vec::new() },
+            rate,
+            misses,
+        }
+    };
+    let titles = ["fixed rates", "rates that give way", "rates that give way, and priorities by use"];
+    let band = |(run, title): (usize, &str)| RateBand {
+        title: title.into(),
+        rows: (0..names.len()).map(|i| row(run, i)).collect(),
+    };
+    let span = |from, to, label: &str| Span { from, to, label: label.into() };
+    Bands {
+        bands: titles.into_iter().enumerate().map(band).collect(),
+        spans: vec![span(30.0, 60.0, "image work × 3"), span(50.0, 70.0, "foreign load")],
+        window: Some((0.0, 120.0)),
     }
 }
 

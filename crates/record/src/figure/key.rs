@@ -2,6 +2,7 @@
 
 use super::Event;
 use super::axes::SMALL;
+use super::bands::hatch;
 use super::canvas::{Anchor, Colour, INK, Pen, Picture, WHITE};
 use super::font;
 
@@ -16,6 +17,7 @@ pub(super) enum Sign {
     Start,
     Goal,
     Tick(Colour),
+    Hatched,
 }
 
 /// Width of a sign and the gap behind it (points).
@@ -86,6 +88,7 @@ fn draw_sign(sign: Sign, picture: &mut Picture, [x, y]: [f64; 2]) {
         Sign::Tick(colour) => {
             picture.line(vec![[middle[0], y - 4.0], [middle[0], y + 4.0]], Pen::new(colour, 1.4))
         }
+        Sign::Hatched => hatch(picture, [x + 1.5, y - 3.5, x + SIGN - 1.5, y + 3.5]),
     }
 }
 

@@ -5,6 +5,7 @@
 //! start of the run, everything else is SI. The same data gives the same bytes.
 
 mod axes;
+mod bands;
 mod canvas;
 mod font;
 mod key;
@@ -17,6 +18,7 @@ mod timing;
 mod trajectory;
 mod velocity;
 
+pub use bands::{BandRow, Bands, RateBand, Span};
 pub use canvas::{Colour, Picture};
 pub use map::Map;
 pub use periods::{PeriodRow, Periods};
@@ -90,6 +92,13 @@ mod tests {
             ..AgentTiming::default()
         };
         let row = PeriodRow { releases: vec![f64::NAN, 1.0], ..PeriodRow::default() };
+        let rates = BandRow {
+            rate: vec![(f64::NAN, 1.0), (0.0, f64::INFINITY), (1.0, 0.5)],
+            misses: vec![f64::NAN],
+            suspended: vec![(2.0, f64::INFINITY), (1.0, 0.0)],
+            ..BandRow::default()
+        };
+        let spans = vec![Span { from: f64::NAN, to: 1.0, label: "<&>".into() }];
         vec![
             Trajectory::default().draw(),
             Trajectory { path, events: vec![event.clone()], ..Trajectory::default() }.draw(),
@@ -100,6 +109,13 @@ mod tests {
             Timing { agents: vec![agent] }.draw(),
             Periods::default().draw(),
             Periods { rows: vec![row], window: Some((2.0, 1.0)) }.draw(),
+            Bands::default().draw(),
+            Bands {
+                bands: vec![RateBand { rows: vec![rates], ..RateBand::default() }],
+                spans,
+                window: Some((f64::NAN, 1.0)),
+            }
+            .draw(),
             Map::default().draw(),
             Map { points: vec![Point { x: f64::NAN, y: 0.0 }], ..Map::default() }.draw(),
         ]
