@@ -16,7 +16,8 @@ pub fn schema(registry: &Registry) -> Json {
     let kinds = registry.types().iter().filter(|kind| kind.kind != "robot");
     let mut agents: Vec<Json> = kinds.map(agent).collect();
     agents.push(group());
-    let [name, world, robot_, executor_, agent_, queue_, wires_, decide_, goal_, vary_, at_] = SECTIONS;
+    let [name, world, robot_, executor_, agent_, queue_, wires_, decide_, knowledge_, goal_, vary_, at_] =
+        SECTIONS;
     let properties = object([
         (name, json!({"type": "string", "description": "The name of the system."})),
         (world, world_()),
@@ -26,6 +27,7 @@ pub fn schema(registry: &Registry) -> Json {
         (queue_, named(queue(), "Mailboxes that several inputs share.")),
         (wires_, wires()),
         (decide_, decide()),
+        (knowledge_, knowledge()),
         (goal_, goal()),
         (
             vary_,
@@ -154,6 +156,8 @@ fn parameter(field: &ParamField) -> Json {
         Value::Int(_) => json!({"type": "integer"}),
         Value::Float(_) => json!({"type": "number"}),
         Value::List(_) => json!({"type": "array"}),
+        // The name of a pattern in the store stands for its table.
+        Value::Table(_) if field.name == "pattern" => json!({"type": ["object", "string"]}),
         Value::Table(_) => json!({"type": "object"}),
         Value::Text(_) if field.kind.starts_with("a time") => json!({"$ref": "#/$defs/time"}),
         Value::Text(_) => json!({"type": "string"}),
@@ -274,6 +278,19 @@ fn decide() -> Json {
         "additionalProperties": {"type": "object"},
         "description": "Whose offer counts how much in which situation.",
     })
+}
+
+fn knowledge() -> Json {
+    let mut schema = closed(
+        [
+            ("file", text("The store, beside the system file; made where it is not there.")),
+            ("begins", text("What the calendar shows when a simulated run begins, as in 2026-03-02 07:59.")),
+            ("decide", text("The decision table of the store that is the decision maker's.")),
+        ],
+        &["file"],
+    );
+    schema["description"] = json!("What is known from one run to the next: a store that the run reads.");
+    schema
 }
 
 fn goal() -> Json {

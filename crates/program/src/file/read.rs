@@ -16,11 +16,23 @@ use super::group::Names;
 use super::library::Shelf;
 use super::sources::{Mistakes, Sources};
 use super::wires::Written;
-use super::{decide, set, tree};
+use super::{decide, knowledge, set, tree};
 
 /// The sections of a system file.
-pub(crate) const SECTIONS: [&str; 11] =
-    ["name", "world", "robot", "executor", "agent", "queue", "wires", "decide", "goal", "vary", "at"];
+pub(crate) const SECTIONS: [&str; 12] = [
+    "name",
+    "world",
+    "robot",
+    "executor",
+    "agent",
+    "queue",
+    "wires",
+    "decide",
+    "knowledge",
+    "goal",
+    "vary",
+    "at",
+];
 /// Longer than anything that robots do. Several such times can be added and each taken four times without an overflow.
 const LONGEST: Duration = Duration::secs(10 * 365 * 24 * 3600);
 /// The agent type that a robot is.
@@ -39,6 +51,8 @@ pub struct Loaded {
     pub folder: PathBuf,
     /// The texts it was read from, for mistakes that are found later.
     pub sources: Sources,
+    /// The store that its section `[knowledge]` names.
+    pub store: Option<PathBuf>,
 }
 
 /// Finds a system file by its path or the name of a built-in scenario, does the `KEY=VALUE` changes to it, and reads it.
@@ -157,12 +171,20 @@ impl<'r> Reader<'r> {
         }
     }
 
-    fn finish(mut self) -> Result<Loaded, Mistakes> {
+    /// A reader that goes on where a system was read, with what is not yet in its plan.
+    pub(super) fn over(loaded: &Loaded, registry: &'r Registry) -> Reader<'r> {
+        let robots = loaded.plan.section(ROBOT).cloned().unwrap_or_default();
+        let (plan, sources, world) = (loaded.plan.clone(), loaded.sources.clone(), loaded.world.clone());
+        Reader { plan, sources, world, robots, ..Reader::new(registry, &loaded.folder) }
+    }
+
+    pub(super) fn finish(mut self) -> Result<Loaded, Mistakes> {
         self.mistakes.sort_by_key(|mistake| mistake.at.start);
         self.mistakes.dedup();
         if self.mistakes.is_empty() {
             let Reader { plan, world, folder, sources, .. } = self;
-            Ok(Loaded { plan, world, folder, sources })
+            let store = knowledge::store(&plan, &folder);
+            Ok(Loaded { plan, world, folder, sources, store })
         } else {
             Err(Mistakes { sources: self.sources, list: self.mistakes })
         }
@@ -181,6 +203,7 @@ impl<'r> Reader<'r> {
         self.settle_wires();
         self.requests(tree);
         decide::read(self, tree);
+        knowledge::read(self, tree);
         self.read_world(tree);
         let judged = runtime::check(&self.plan, self.registry);
         let spoiled = &self.spoiled;
