@@ -437,14 +437,7 @@ impl Summary {
             if let Some(effect) = self.effect_of(incident) {
                 text += &format!("; {effect}");
             }
-            let again = |later: &&usize| {
-                self.incidents[**later].agent == incident.agent
-                    && self.incidents[**later].what == incident.what
-            };
-            let more: Vec<usize> = (i + 1..self.incidents.len())
-                .filter(|_| knowing::is_schedule(&incident.agent))
-                .filter(|later| again(&later))
-                .collect();
+            let more = self.asked_again(i);
             if let Some(last) = more.last() {
                 let last = seconds(self.since(self.incidents[*last].time));
                 text += &format!(", and {} more times until {last}", more.len());
@@ -453,6 +446,16 @@ impl Summary {
             told.push(text);
         }
         told
+    }
+
+    /// When a schedule asked for the same later, and the same became of it.
+    fn asked_again(&self, first: usize) -> Vec<usize> {
+        let Incident { agent, what, .. } = &self.incidents[first];
+        if !knowing::is_schedule(agent) {
+            return Vec::new();
+        }
+        let same = |later: &Incident| later.agent == *agent && later.what == *what;
+        (first + 1..self.incidents.len()).filter(|later| same(&self.incidents[*later])).collect()
     }
 
     /// Asking for real time and not getting it is said aloud.

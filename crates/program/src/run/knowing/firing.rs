@@ -23,7 +23,7 @@ pub(super) enum Asks {
     /// Something of the robots.
     Deed(Deed),
     /// Something of the system.
-    Request(Request),
+    Request(Box<Request>),
 }
 
 /// What incidents call a schedule.
@@ -42,7 +42,7 @@ pub(super) fn asks(words: &[String]) -> Result<Asks, Refusal> {
     let deed = words.first().filter(|verb| ["stop", "reset"].contains(&verb.as_str()));
     match deed.and_then(|_| Deed::read(words)) {
         Some(deed) => Ok(Asks::Deed(deed)),
-        None => control::words::parse(words).map(Asks::Request),
+        None => control::words::parse(words).map(|request| Asks::Request(Box::new(request))),
     }
 }
 

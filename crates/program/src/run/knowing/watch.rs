@@ -75,6 +75,12 @@ pub(super) fn start(
     Ok(Looking { over, thread: Some(thread), gone })
 }
 
+/// What was read of a store in which somebody has written.
+struct News {
+    newest: Option<Version>,
+    schedules: Vec<Schedule>,
+}
+
 /// The system has ended: there is nobody to be asked.
 #[derive(Debug, PartialEq, Eq)]
 pub(super) struct Ended;
@@ -126,7 +132,7 @@ impl Watch {
     pub(super) fn look(&mut self, since_start: Duration) -> Result<(), Ended> {
         match self.news() {
             Ok(None) => {}
-            Ok(Some((newest, schedules))) => {
+            Ok(Some(News { newest, schedules })) => {
                 self.learn_table(newest)?;
                 self.learn_schedules(schedules);
             }
@@ -136,7 +142,7 @@ impl Watch {
     }
 
     /// What the store holds, if anybody has written since.
-    fn news(&mut self) -> Result<Option<(Option<Version>, Vec<Schedule>)>, KnowledgeError> {
+    fn news(&mut self) -> Result<Option<News>, KnowledgeError> {
         let writes = self.store.writes()?;
         if self.seen == Some(writes) {
             return Ok(None);
@@ -149,7 +155,7 @@ impl Watch {
         let schedules = now.schedules()?;
         // What was written between the two is read once more.
         self.seen = Some(writes);
-        Ok(Some((newest, schedules)))
+        Ok(Some(News { newest, schedules }))
     }
 
     fn learn_table(&mut self, newest: Option<Version>) -> Result<(), Ended> {
@@ -254,17 +260,16 @@ impl Watch {
     }
 
     fn fire_one(&self, agent: String, words: &[String], asks: Asks) -> Result<(), Ended> {
-        let done = match asks {
+        let request = match asks {
             // The judge does it, and tells.
             Asks::Deed(deed) => return self.asked.act_for(&agent, deed).map_err(|_| Ended),
-            Asks::Request(request) => self.request(request)?,
+            Asks::Request(request) => *request,
         };
-        let outcome = done.err().map_or(String::new(), |refusal| format!("; refused: {refusal}"));
-        let time = self.now()?;
-        let words = words::join(words);
-        // The runtime tells of faults by itself.
-        let asked = if words.contains("fault ") { "fired" } else { "asked" };
-        self.asked.done(Incident { time, agent, what: format!("{asked}: {words}{outcome}") });
+        // What is asked for in the way of faults, the runtime tells by itself.
+        let verb = if has_fault(&request) { "fired" } else { "asked" };
+        let outcome = self.request(request)?.err().map_or(String::new(), |why| format!("; refused: {why}"));
+        let (time, words) = (self.now()?, words::join(words));
+        self.asked.done(Incident { time, agent, what: format!("{verb}: {words}{outcome}") });
         Ok(())
     }
 
@@ -282,5 +287,14 @@ impl Watch {
         if self.said.insert(text.clone()) {
             (self.knowing.tell)(&text);
         }
+    }
+}
+
+fn has_fault(request: &Request) -> bool {
+    match request {
+        Request::Fault { .. } => true,
+        Request::All(requests) => requests.iter().any(has_fault),
+        Request::Forced(request) => has_fault(request),
+        _ => false,
     }
 }
