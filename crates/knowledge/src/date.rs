@@ -1,6 +1,7 @@
 //! Dates of the Gregorian calendar.
 
 use std::fmt;
+use std::str::FromStr;
 
 use types::Time;
 
@@ -52,6 +53,66 @@ impl Date {
     }
 }
 
+impl Date {
+    /// The time, counted from 1970; nothing for a date so far away that no [`Time`] is it.
+    pub fn time(self) -> Option<Time> {
+        let time = i128::from(self.to_day()) * i128::from(DAY) + i128::from(self.second) * 1_000_000_000;
+        i64::try_from(time).ok().map(Time)
+    }
+
+    /// Its day, counted from 1970-01-01 (the same source, `days_from_civil`).
+    fn to_day(self) -> i64 {
+        let year = self.year - i64::from(self.month <= 2);
+        let (era, year_of_era) = (year.div_euclid(400), year.rem_euclid(400));
+        let month = if self.month > 2 { self.month - 3 } else { self.month + 9 };
+        let day_of_year = (153 * i64::from(month) + 2) / 5 + i64::from(self.day) - 1;
+        let day_of_era = year_of_era * 365 + year_of_era / 4 - year_of_era / 100 + day_of_year;
+        era * 146_097 + day_of_era - 719_468
+    }
+}
+
+/// A text is no date.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
+#[error("a date is as in \"2026-03-02 07:59\", with or without the time of day, from 1678 to 2261")]
+pub struct NotADate;
+
+impl FromStr for Date {
+    type Err = NotADate;
+
+    /// Reads `2026-03-02`, `2026-03-02 07:59` and `2026-03-02 07:59:30`.
+    fn from_str(text: &str) -> Result<Date, NotADate> {
+        let (day, clock) = text.trim().split_once(' ').unwrap_or((text.trim(), "00:00"));
+        let [year, month, day] = numbers(day, '-', [4, 2, 2]).ok_or(NotADate)?;
+        let clock = clock.trim_start();
+        let of_day = numbers(clock, ':', [2, 2, 2]);
+        let of_day = of_day.or_else(|| numbers(clock, ':', [2, 2]).map(|[hour, minute]| [hour, minute, 0]));
+        let [hour, minute, second] = of_day.ok_or(NotADate)?;
+        if hour > 23 || minute > 59 || second > 59 || !(1678..=2261).contains(&year) {
+            return Err(NotADate);
+        }
+        let date = Date { year: year.into(), month, day, second: hour * 3600 + minute * 60 + second };
+        // A day that no month has is another one when it comes back.
+        let back = date.time().map(Date::of);
+        back.filter(|back| *back == date && (1..=12).contains(&month)).ok_or(NotADate)
+    }
+}
+
+/// Numbers of so many digits, with a letter between them.
+fn numbers<const N: usize>(text: &str, between: char, digits: [usize; N]) -> Option<[u32; N]> {
+    let parts: Vec<&str> = text.split(between).collect();
+    let fits = |(part, digits): (&&str, usize)| {
+        part.len() == digits && part.bytes().all(|byte| byte.is_ascii_digit())
+    };
+    if parts.len() != N || !parts.iter().zip(digits).all(fits) {
+        return None;
+    }
+    let mut numbers = [0; N];
+    for (number, part) in numbers.iter_mut().zip(parts) {
+        *number = part.parse().ok()?;
+    }
+    Some(numbers)
+}
+
 impl fmt::Display for Date {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let Date { year, month, day, second } = self;
@@ -78,6 +139,52 @@ mod tests {
     fn dates_are_those_of_the_system() {
         for (seconds, date) in BY_DATE {
             assert_eq!(Date::of(Time(seconds * 1_000_000_000)).to_string(), date);
+            let read: Date = date.parse().unwrap();
+            assert_eq!(read.time(), Some(Time(seconds * 1_000_000_000)), "{date}");
+        }
+    }
+
+    #[test]
+    fn a_date_is_read_with_and_without_its_time_of_day() {
+        for (text, read) in [
+            ("2026-03-02", "2026-03-02 00:00:00"),
+            ("2026-03-02 07:59", "2026-03-02 07:59:00"),
+            (" 2024-02-29  23:59:59 ", "2024-02-29 23:59:59"),
+        ] {
+            assert_eq!(text.parse::<Date>().unwrap().to_string(), read);
+        }
+        for text in [
+            "",
+            "today",
+            "2026-3-2",
+            "02.03.2026",
+            "2026-02-29",
+            "2026-13-01",
+            "2026-00-10",
+            "2026-04-31",
+            "2026-03-02 24:00",
+            "2026-03-02 07:60",
+            "2026-03-02 7:59",
+            "2026-03-02T07:59",
+            "1200-01-01",
+            "9999-01-01",
+            "2026-03-02 07:59:30.5",
+        ] {
+            assert_eq!(text.parse::<Date>(), Err(NotADate), "{text}");
+        }
+    }
+
+    proptest::proptest! {
+        #[test]
+        fn every_date_that_is_shown_is_read_back(second in -9_214_560_000_i64..9_214_646_400) {
+            let date = Date::of(Time(second * 1_000_000_000));
+            proptest::prop_assert_eq!(date.to_string().parse::<Date>(), Ok(date));
+            proptest::prop_assert_eq!(date.time(), Some(Time(second * 1_000_000_000)));
+        }
+
+        #[test]
+        fn any_text_is_a_date_or_none(text in "[0-9]{4}-[0-9]{2}-[0-9]{2}( [0-9:]{5,8})?|.{0,20}") {
+            let _ = text.parse::<Date>();
         }
     }
 

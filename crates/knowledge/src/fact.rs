@@ -7,7 +7,7 @@ use rusqlite::{Connection, Transaction, params_from_iter};
 use types::Time;
 
 use crate::error::{Result, check_word};
-use crate::{KnowledgeError, Listed};
+use crate::{KnowledgeError, Listed, seal};
 
 /// A fact such as `cup in kitchen`. A subject may have several objects for one predicate.
 ///
@@ -58,12 +58,9 @@ impl Fact {
 
     pub(crate) fn put(&self, file: &Path, transaction: &Transaction<'_>) -> Result<()> {
         // A new row each time, so that the last of those with one time is the one that was put last.
-        let put = transaction.execute(
-            "INSERT OR REPLACE INTO fact (subject, predicate, object, source, confidence, time)
-             VALUES (?1, ?2, ?3, ?4, ?5, ?6)",
-            (&self.subject, &self.predicate, &self.object, &self.source, self.confidence, self.time.0),
-        );
-        put.map(drop).map_err(|error| KnowledgeError::of(file, &error))
+        let Fact { subject, predicate, object, confidence, time, source } = self;
+        let put = seal::put(transaction, "fact", &[subject, predicate, object, confidence, &time.0, source]);
+        put.map_err(|error| KnowledgeError::of(file, &error))
     }
 }
 
@@ -125,10 +122,11 @@ impl Query {
         let (condition, mut values) = self.condition();
         values.push(Sql::Integer(self.most.map_or(-1, i64::from)));
         let mut statement = connection.prepare(&format!(
-            "SELECT subject, predicate, object, confidence, time, source FROM fact
+            "SELECT subject, predicate, object, confidence, time, source, crc FROM fact
              WHERE {condition} ORDER BY time DESC, id DESC LIMIT ?"
         ))?;
         let facts = statement.query_map(params_from_iter(values), |row| {
+            seal::verify(row, 6)?;
             Ok(Fact {
                 subject: row.get(0)?,
                 predicate: row.get(1)?,

@@ -4,14 +4,15 @@ use std::path::Path;
 
 use rusqlite::{Connection, TransactionBehavior};
 
-use crate::KnowledgeError;
 use crate::error::Result;
+use crate::{KnowledgeError, seal};
 
 /// Marks a file as a knowledge base: `SNWK` in ASCII.
 pub(crate) const MARK: i64 = 0x534E_574B;
 
 /// Step `n` leads from form `n` to form `n + 1`. A step that was released never changes; a new form is a new step.
-pub(crate) const STEPS: &[&str] = &["
+pub(crate) const STEPS: &[&str] = &[
+    "
 CREATE TABLE decision_table (
     name TEXT NOT NULL,
     version INTEGER NOT NULL,
@@ -60,7 +61,12 @@ CREATE TABLE map (
     height INTEGER NOT NULL,
     cells BLOB NOT NULL
 ) STRICT;
-"];
+",
+    seal::STEP,
+];
+
+/// From this form on rows have sums.
+const SEALED: usize = 2;
 
 /// What a file is, by its head and its list of tables.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -124,13 +130,17 @@ pub(crate) fn bring_up(connection: &mut Connection, file: &Path, steps: &[&str])
     for step in &steps[from..] {
         transaction.execute_batch(step).map_err(failed)?;
     }
+    if from < SEALED && steps.len() >= SEALED {
+        seal::fill(&transaction).map_err(failed)?;
+    }
     transaction
         .execute_batch(&format!("PRAGMA application_id = {MARK}; PRAGMA user_version = {};", steps.len()))
         .map_err(failed)?;
     transaction.commit().map_err(failed)
 }
 
-/// Refuses a file whose tables are not the ones of its form, or whose pages do not fit together.
+/// Refuses a file whose tables are not the ones of its form, whose pages or indices do not fit together, or whose rows are not those
+/// that were written.
 fn check(connection: &Connection, file: &Path, steps: &[&str]) -> Result<()> {
     let failed = |error: rusqlite::Error| KnowledgeError::of(file, &error);
     let right = Connection::open_in_memory().map_err(failed)?;
@@ -139,8 +149,14 @@ fn check(connection: &Connection, file: &Path, steps: &[&str]) -> Result<()> {
         return Err(KnowledgeError::damaged(file, "its tables are not those of a knowledge base"));
     }
     let found: String =
-        connection.query_row("PRAGMA quick_check(1)", [], |row| row.get(0)).map_err(failed)?;
-    if found == "ok" { Ok(()) } else { Err(KnowledgeError::damaged(file, found)) }
+        connection.query_row("PRAGMA integrity_check(1)", [], |row| row.get(0)).map_err(failed)?;
+    if found != "ok" {
+        return Err(KnowledgeError::damaged(file, found));
+    }
+    if steps.len() < SEALED {
+        return Ok(());
+    }
+    seal::check(connection).map_err(failed)?.map_err(|why| KnowledgeError::damaged(file, why))
 }
 
 /// All that was ever created, as it was written. Statistics that tools add change nothing.
@@ -173,31 +189,34 @@ mod tests {
 
     #[test]
     fn a_fresh_file_gets_the_newest_form_and_an_old_one_keeps_what_is_in_it() {
-        let steps = [STEPS[0], NEXT];
+        let steps = [STEPS[0], STEPS[1], NEXT];
         let file = Path::new(FILE);
-        assert_eq!(look(&with(&steps), file, &steps), Ok(Form::Known(2)));
+        assert_eq!(look(&with(&steps), file, &steps), Ok(Form::Known(3)));
         let mut old = with(&steps[..1]);
         old.execute_batch(CUP).unwrap();
         assert_eq!(look(&old, file, &steps), Ok(Form::Known(1)));
         bring_up(&mut old, file, &steps).unwrap();
-        assert_eq!((look(&old, file, &steps), facts(&old)), (Ok(Form::Known(2)), 1));
-        assert_eq!(check(&old, file, &steps), Ok(()));
+        assert_eq!((look(&old, file, &steps), facts(&old)), (Ok(Form::Known(3)), 1));
+        assert_eq!(check(&old, file, &steps), Ok(()), "its rows have sums now");
+        old.execute_batch("UPDATE fact SET object = 'kitchem'").unwrap();
+        assert!(matches!(check(&old, file, &steps), Err(KnowledgeError::Damaged { .. })));
     }
 
     #[test]
     fn a_step_that_fails_changes_nothing() {
-        let mut old = with(STEPS);
+        let before = &STEPS[..1];
+        let mut old = with(before);
         old.execute_batch(CUP).unwrap();
-        let steps = [STEPS[0], NEXT, "CREATE TABLE fact (x);"];
+        let steps = [STEPS[0], STEPS[1], NEXT, "CREATE TABLE fact (x);"];
         assert!(bring_up(&mut old, Path::new(FILE), &steps).is_err());
         assert_eq!(look(&old, Path::new(FILE), &steps), Ok(Form::Known(1)));
-        assert_eq!((check(&old, Path::new(FILE), STEPS), facts(&old)), (Ok(()), 1));
+        assert_eq!((check(&old, Path::new(FILE), before), facts(&old)), (Ok(()), 1));
     }
 
     #[test]
     fn a_form_that_comes_later_is_too_new() {
-        let newer = with(&[STEPS[0], NEXT]);
+        let newer = with(&[STEPS[0], STEPS[1], NEXT]);
         let said = look(&newer, Path::new(FILE), STEPS).unwrap_err();
-        assert_eq!(said.to_string(), "knowledge.db has form 2, and this program knows forms up to 1");
+        assert_eq!(said.to_string(), "knowledge.db has form 3, and this program knows forms up to 2");
     }
 }

@@ -6,6 +6,7 @@
 //! | reading, all from one moment | [`Snapshot`] |
 //! | what is kept | [`DecisionTable`], [`Fact`], [`Pattern`], [`Schedule`], [`Map`] |
 //! | which schedules are due, on any clock | [`due`] |
+//! | a pattern as the colours that an agent looks for | [`colours`] |
 //! | what can go wrong, and how it is mended | [`KnowledgeError`] |
 //!
 //! ```
@@ -31,6 +32,7 @@
 //! - A write that was answered with `Ok` is on the disk: it outlives the end of the process and of the power.
 //! - A write is done whole or not at all; so is [`Knowledge::put_all`].
 //! - One writes at a time, over all processes; a writer waits for another at most [`PATIENCE`]. Readers neither wait nor are waited for.
+//! - Each row has a sum: a byte that changed is told, and nothing else is read in its place.
 //! - A file that is damaged, foreign or too new is told and left as it is.
 //! - Nothing here reads a clock: times come in as arguments.
 //!
@@ -38,6 +40,7 @@
 //! computers that share one over a network would spoil it.
 #![forbid(unsafe_code)]
 
+mod colour;
 mod cron;
 mod date;
 mod error;
@@ -47,13 +50,15 @@ mod layout;
 mod map;
 mod pattern;
 mod schedule;
+mod seal;
 mod snapshot;
 mod store;
 mod table;
 mod text;
 
+pub use colour::{NoColour, colours};
 pub use cron::{Cron, NotCron};
-pub use date::Date;
+pub use date::{Date, NotADate};
 pub use error::KnowledgeError;
 pub use fact::{Fact, Query, Reach, Reached};
 pub use item::{Item, Kind, Listed};

@@ -7,7 +7,7 @@ use types::{Pose, Time};
 
 use crate::error::{Result, check_word};
 use crate::pattern::LARGEST;
-use crate::{KnowledgeError, Listed};
+use crate::{KnowledgeError, Listed, seal};
 
 /// A grid of square cells.
 #[derive(Clone, Debug, PartialEq)]
@@ -57,27 +57,30 @@ impl Map {
 
     pub(crate) fn put(&self, file: &Path, transaction: &Transaction<'_>) -> Result<()> {
         let Pose { x, y, heading } = self.origin;
-        let put = transaction.execute(
-            "INSERT OR REPLACE INTO map (name, time, resolution, x, y, heading, width, height, cells)
-             VALUES (?1, ?2, ?3, ?4, ?5, ?6, ?7, ?8, ?9)",
-            (&self.name, self.time.0, self.resolution, x, y, heading, self.width, self.height, &self.cells),
+        let Map { name, time, resolution, width, height, cells, .. } = self;
+        let put = seal::put(
+            transaction,
+            "map",
+            &[name, &time.0, resolution, &x, &y, &heading, width, height, cells],
         );
-        put.map(drop).map_err(|error| KnowledgeError::of(file, &error))
+        put.map_err(|error| KnowledgeError::of(file, &error))
     }
 }
 
 pub(crate) fn get(file: &Path, connection: &Connection, name: &str) -> Result<Option<Map>> {
-    let sql = "SELECT time, resolution, x, y, heading, width, height, cells FROM map WHERE name = ?1";
+    let sql =
+        "SELECT name, time, resolution, x, y, heading, width, height, cells, crc FROM map WHERE name = ?1";
     let map = connection
         .query_row(sql, [name], |row| {
+            seal::verify(row, 9)?;
             Ok(Map {
                 name: name.to_owned(),
-                time: Time(row.get(0)?),
-                resolution: row.get(1)?,
-                origin: Pose { x: row.get(2)?, y: row.get(3)?, heading: row.get(4)? },
-                width: row.get(5)?,
-                height: row.get(6)?,
-                cells: row.get(7)?,
+                time: Time(row.get(1)?),
+                resolution: row.get(2)?,
+                origin: Pose { x: row.get(3)?, y: row.get(4)?, heading: row.get(5)? },
+                width: row.get(6)?,
+                height: row.get(7)?,
+                cells: row.get(8)?,
             })
         })
         .optional()

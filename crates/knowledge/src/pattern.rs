@@ -6,7 +6,7 @@ use rusqlite::{Connection, OptionalExtension as _, Transaction};
 use types::value::Table;
 
 use crate::error::{Result, check_word};
-use crate::{KnowledgeError, Listed, text};
+use crate::{KnowledgeError, Listed, seal, text};
 
 /// Larger blobs than this do not belong into a database (bytes).
 pub(crate) const LARGEST: usize = 256 << 20;
@@ -84,18 +84,20 @@ impl Pattern {
 
     pub(crate) fn put(&self, file: &Path, transaction: &Transaction<'_>) -> Result<()> {
         let parameters = text::write(&self.parameters).map_err(|why| KnowledgeError::wrong(why, ""))?;
-        let put = transaction.execute(
-            "INSERT OR REPLACE INTO pattern (name, kind, media_type, parameters, bytes) VALUES (?1, ?2, ?3, ?4, ?5)",
-            (&self.name, self.kind.name(), &self.media_type, parameters, &self.bytes),
-        );
-        put.map(drop).map_err(|error| KnowledgeError::of(file, &error))
+        let Pattern { name, media_type, bytes, .. } = self;
+        let put =
+            seal::put(transaction, "pattern", &[name, &self.kind.name(), media_type, &parameters, bytes]);
+        put.map_err(|error| KnowledgeError::of(file, &error))
     }
 }
 
 pub(crate) fn get(file: &Path, connection: &Connection, name: &str) -> Result<Option<Pattern>> {
-    let sql = "SELECT kind, media_type, parameters, bytes FROM pattern WHERE name = ?1";
+    let sql = "SELECT name, kind, media_type, parameters, bytes, crc FROM pattern WHERE name = ?1";
     let found: Option<(String, String, String, Vec<u8>)> = connection
-        .query_row(sql, [name], |row| Ok((row.get(0)?, row.get(1)?, row.get(2)?, row.get(3)?)))
+        .query_row(sql, [name], |row| {
+            seal::verify(row, 5)?;
+            Ok((row.get(1)?, row.get(2)?, row.get(3)?, row.get(4)?))
+        })
         .optional()
         .map_err(|error| KnowledgeError::of(file, &error))?;
     let Some((kind, media_type, parameters, bytes)) = found else { return Ok(None) };

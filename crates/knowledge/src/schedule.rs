@@ -7,7 +7,7 @@ use types::value::{Table, Value};
 use types::{Duration, Time};
 
 use crate::error::{Result, check_word};
-use crate::{Cron, KnowledgeError, Listed, text};
+use crate::{Cron, KnowledgeError, Listed, seal, text};
 
 /// Something that is to be done at certain times.
 #[derive(Clone, Debug, PartialEq)]
@@ -109,11 +109,8 @@ impl Schedule {
         let mut table = Table::new();
         table.set("do", Value::List(words));
         let words = text::write(&table).map_err(|why| KnowledgeError::wrong(why, ""))?;
-        let put = transaction.execute(
-            "INSERT OR REPLACE INTO schedule (name, kind, first, period, cron, words) VALUES (?1, ?2, ?3, ?4, ?5, ?6)",
-            (&self.name, kind, first, period, cron, words),
-        );
-        put.map(drop).map_err(|error| KnowledgeError::of(file, &error))
+        let put = seal::put(transaction, "schedule", &[&self.name, &kind, &first, &period, &cron, &words]);
+        put.map_err(|error| KnowledgeError::of(file, &error))
     }
 
     pub(crate) fn listed(&self) -> Listed {
@@ -125,11 +122,12 @@ impl Schedule {
 pub(crate) fn all(file: &Path, connection: &Connection) -> Result<Vec<Schedule>> {
     let failed = |error: rusqlite::Error| KnowledgeError::of(file, &error);
     let mut statement = connection
-        .prepare("SELECT name, kind, first, period, cron, words FROM schedule ORDER BY name")
+        .prepare("SELECT name, kind, first, period, cron, words, crc FROM schedule ORDER BY name")
         .map_err(failed)?;
     let mut rows = statement.query([]).map_err(failed)?;
     let mut all = Vec::new();
     while let Some(row) = rows.next().map_err(failed)? {
+        seal::verify(row, 6).map_err(failed)?;
         let name: String = row.get(0).map_err(failed)?;
         let kind: String = row.get(1).map_err(failed)?;
         let first = row.get::<_, Option<i64>>(2).map_err(failed)?.map(Time);

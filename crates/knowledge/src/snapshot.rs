@@ -33,13 +33,18 @@ impl<'k> Snapshot<'k> {
 
     /// The newest version of a decision table.
     pub fn table(&self, name: &str) -> Result<Option<DecisionTable>> {
-        let newest = self.history(name)?.into_iter().next();
+        let newest = self.newest(name)?;
         Ok(newest.map(|Version { weights, time, .. }| DecisionTable { name: name.to_owned(), weights, time }))
+    }
+
+    /// The same with its number.
+    pub fn newest(&self, name: &str) -> Result<Option<Version>> {
+        Ok(table::history(self.file, &self.transaction, name, 1)?.pop())
     }
 
     /// All versions of a decision table, the newest first.
     pub fn history(&self, name: &str) -> Result<Vec<Version>> {
-        table::history(self.file, &self.transaction, name)
+        table::history(self.file, &self.transaction, name, u32::MAX)
     }
 
     /// The facts that fit, the newest first.

@@ -4,14 +4,14 @@ use std::path::Path;
 
 use rusqlite::{Connection, OptionalExtension as _, Transaction};
 use types::Time;
-use types::value::Table;
+use types::value::{Row, Table, Value};
 
 use crate::error::{Result, check_word};
-use crate::{KnowledgeError, Listed, text};
+use crate::{KnowledgeError, Listed, seal, text};
 
-/// A decision table: for each situation the weight of each agent, from 0 to 1.
+/// A decision table: for each situation the weight of each agent, from 0 to 1, or a table of what else it shall do.
 ///
-/// Each put of other weights is a version of its own; those before are kept.
+/// Each put of another table is a version of its own; those before are kept.
 #[derive(Clone, Debug, PartialEq)]
 pub struct DecisionTable {
     /// What it is called.
@@ -34,39 +34,31 @@ pub struct Version {
 }
 
 impl DecisionTable {
-    /// Whether situations and agents are known is for those to say who know them: here a row needs a name and a table of weights.
+    /// Whether situations, agents and their entries are known is for those to say who know them: here a row needs a name and a table of
+    /// what could be entries.
     pub(crate) fn check(&self) -> Result<()> {
         check_word("the name of a decision table", &self.name)?;
         let name = &self.name;
+        let wrong =
+            |why: String, help: &str| Err(KnowledgeError::wrong(format!("table \"{name}\": {why}"), help));
+        let help = "a row is as in free = { safety = 0.0, wall = 1.0 }";
         if self.weights.is_empty() {
             let help = "give it one at least, as in free = { wall = 1.0 }";
             return Err(KnowledgeError::wrong(format!("table \"{name}\" has no row"), help));
         }
         for row in self.weights.rows() {
-            let help = "a row is as in free = { safety = 0.0, wall = 1.0 }";
-            let Some(agents) = row.entry.value.as_table() else {
-                let what = format!(
-                    "table \"{name}\": \"{}\" is {}, not a table of weights",
-                    row.key,
-                    row.entry.value.kind()
-                );
-                return Err(KnowledgeError::wrong(what, help));
+            if row.key.is_empty() {
+                return wrong("a row has no name".into(), help);
+            }
+            let Some(entries) = row.entry.value.as_table() else {
+                let kind = row.entry.value.kind();
+                return wrong(format!("\"{}\" is {kind}, not a table of weights", row.key), help);
             };
-            for agent in agents.rows() {
-                let value = &agent.entry.value;
-                if !value.as_float().is_some_and(|weight| (0.0..=1.0).contains(&weight)) {
-                    let (row, agent) = (&row.key, &agent.key);
-                    let what = format!(
-                        "table \"{name}\": the weight of \"{agent}\" in \"{row}\" is {value}, not a number from 0 to 1"
-                    );
-                    return Err(KnowledgeError::wrong(what, help));
-                }
+            if let Some(why) = entries.rows().iter().find_map(|entry| mistake(entry, &row.key)) {
+                return wrong(why, help);
             }
         }
-        let written = text::write(&self.weights);
-        written
-            .map(drop)
-            .map_err(|why| KnowledgeError::wrong(format!("table \"{name}\": {why}"), "each name stands once"))
+        text::write(&self.weights).map(drop).or_else(|why| wrong(why, "each name stands once"))
     }
 
     /// A new version, unless the newest says the same.
@@ -86,29 +78,57 @@ impl DecisionTable {
             Some((version, _)) => version.saturating_add(1),
             None => 1,
         };
-        transaction
-            .execute(
-                "INSERT INTO decision_table (name, version, time, weights) VALUES (?1, ?2, ?3, ?4)",
-                (&self.name, version, self.time.0, weights),
-            )
-            .map(drop)
+        seal::put(transaction, "decision_table", &[&self.name, &version, &self.time.0, &weights])
             .map_err(failed)
     }
 }
 
-/// All versions of a table, the newest first.
-pub(crate) fn history(file: &Path, connection: &Connection, name: &str) -> Result<Vec<Version>> {
+/// The entries of a row that are numbers but no weights.
+const NO_WEIGHTS: [&str; 3] = ["when", "until", "priority"];
+
+/// What is wrong with an entry of a row.
+fn mistake(entry: &Row, row: &str) -> Option<String> {
+    let Row { key, entry, .. } = entry;
+    let value = &entry.value;
+    let finite = value.as_float().is_some_and(f64::is_finite);
+    match value {
+        Value::Text(_) | Value::Bool(_) => None,
+        Value::Table(inner) => inner.rows().iter().find_map(|deeper| {
+            let value = &deeper.entry.value;
+            let fits = match value {
+                Value::Text(_) | Value::Bool(_) => true,
+                value if ["weight", "importance"].contains(&deeper.key.as_str()) => is_weight(value),
+                value => value.as_float().is_some_and(|number| number.is_finite() && number >= 0.0),
+            };
+            let what = || format!("\"{}\" of \"{key}\" in \"{row}\" cannot be {value}", deeper.key);
+            (!fits).then(what)
+        }),
+        _ if NO_WEIGHTS.contains(&key.as_str()) && finite => None,
+        value if is_weight(value) => None,
+        value => Some(format!("the weight of \"{key}\" in \"{row}\" is {value}, not a number from 0 to 1")),
+    }
+}
+
+fn is_weight(value: &Value) -> bool {
+    value.as_float().is_some_and(|weight| (0.0..=1.0).contains(&weight))
+}
+
+/// The versions of a table, the newest first, so many at most.
+pub(crate) fn history(file: &Path, connection: &Connection, name: &str, most: u32) -> Result<Vec<Version>> {
     let failed = |error: rusqlite::Error| KnowledgeError::of(file, &error);
     let mut statement = connection
-        .prepare("SELECT version, time, weights FROM decision_table WHERE name = ?1 ORDER BY version DESC")
+        .prepare(
+            "SELECT name, version, time, weights, crc FROM decision_table WHERE name = ?1 ORDER BY version DESC LIMIT ?2",
+        )
         .map_err(failed)?;
-    let mut rows = statement.query([name]).map_err(failed)?;
+    let mut rows = statement.query((name, most)).map_err(failed)?;
     let mut versions = Vec::new();
     while let Some(row) = rows.next().map_err(failed)? {
-        let line: String = row.get(2).map_err(failed)?;
+        seal::verify(row, 4).map_err(failed)?;
+        let line: String = row.get(3).map_err(failed)?;
         versions.push(Version {
-            number: row.get(0).map_err(failed)?,
-            time: Time(row.get(1).map_err(failed)?),
+            number: row.get(1).map_err(failed)?,
+            time: Time(row.get(2).map_err(failed)?),
             weights: text::read(&line).ok_or_else(|| {
                 KnowledgeError::damaged(file, format!("the table \"{name}\" cannot be read"))
             })?,

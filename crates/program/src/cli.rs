@@ -90,6 +90,9 @@ pub(crate) struct RunArgs {
     /// Runs only these agents, and the wires between them.
     #[arg(long, value_name = "AGENTS", value_delimiter = ',')]
     pub(crate) only: Vec<String>,
+    /// The knowledge base that the run reads, in the place of the one of the section [knowledge]; made where it is not there.
+    #[arg(long, value_name = "F.db")]
+    pub(crate) know: Option<PathBuf>,
     /// The file of a recorded robot, for the scenario "recorded": a CARMEN log, wheel counts, or our own .mcap.
     #[arg(long, value_name = "FILE")]
     pub(crate) from: Option<PathBuf>,

@@ -26,6 +26,7 @@ pub fn schema(registry: &Registry) -> Json {
         queue_,
         wires_,
         decide_,
+        knowledge_,
         goal_,
         vary_,
         burden_,
@@ -45,6 +46,7 @@ pub fn schema(registry: &Registry) -> Json {
         (queue_, named(queue(), "Mailboxes that several inputs share.")),
         (wires_, wires()),
         (decide_, decide()),
+        (knowledge_, knowledge()),
         (goal_, goal()),
         (
             vary_,
@@ -231,6 +233,8 @@ fn parameter(field: &ParamField) -> Json {
         Value::Int(_) => json!({"type": "integer"}),
         Value::Float(_) => json!({"type": "number"}),
         Value::List(_) => json!({"type": "array"}),
+        // The name of a pattern in the store stands for its table.
+        Value::Table(_) if field.name == "pattern" => json!({"type": ["object", "string"]}),
         Value::Table(_) => json!({"type": "object"}),
         Value::Text(_) if field.kind.starts_with("a time") => json!({"$ref": "#/$defs/time"}),
         Value::Text(_) => json!({"type": "string"}),
@@ -351,6 +355,19 @@ fn decide() -> Json {
         "additionalProperties": {"type": "object"},
         "description": "Whose offer counts how much in which situation.",
     })
+}
+
+fn knowledge() -> Json {
+    let mut schema = closed(
+        [
+            ("file", text("The store, beside the system file; made where it is not there.")),
+            ("begins", text("What the calendar shows when a simulated run begins, as in 2026-03-02 07:59.")),
+            ("decide", text("The decision table of the store that is the decision maker's.")),
+        ],
+        &["file"],
+    );
+    schema["description"] = json!("What is known from one run to the next: a store that the run reads.");
+    schema
 }
 
 fn goal() -> Json {

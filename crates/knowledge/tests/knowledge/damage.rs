@@ -31,6 +31,23 @@ fn filled(folder: &Folder) -> Vec<u8> {
     fs::read(folder.file()).unwrap()
 }
 
+#[test]
+fn a_row_that_is_changed_while_the_file_is_open_is_told_when_it_is_read() {
+    for change in [
+        "UPDATE fact SET confidence = 0.5 WHERE id = 3",
+        "UPDATE map SET cells = zeroblob(20000)",
+        "UPDATE map SET x = 0.25",
+    ] {
+        let folder = Folder::new();
+        filled(&folder);
+        let mut knowledge = Knowledge::open(folder.file()).unwrap();
+        rusqlite::Connection::open(folder.file()).unwrap().execute_batch(change).unwrap();
+        let error = read_all(&mut knowledge).unwrap_err();
+        assert!(matches!(error, KnowledgeError::Damaged { .. }), "{change}: {error:?}");
+        assert!(error.to_string().contains("a row is not what was written"), "{error}");
+    }
+}
+
 /// Reads all that there is; errors are answers.
 fn read_all(knowledge: &mut Knowledge) -> Result<(), KnowledgeError> {
     let now = knowledge.read()?;
@@ -143,16 +160,21 @@ fn values_that_nobody_here_wrote_are_damage() {
         "UPDATE map SET height = -1",
         "UPDATE map SET resolution = -1",
         "UPDATE fact SET subject = CAST(x'ff' AS TEXT) WHERE id = 3",
-        "INSERT INTO decision_table VALUES ('roaming', 1, 0, '{ free = ')",
-        "INSERT INTO decision_table VALUES ('roaming', -1, 0, '{}')",
-        "INSERT INTO schedule VALUES ('nightly', 'cron', NULL, NULL, 'never', '{ do = [\"reset\"] }')",
-        "INSERT INTO schedule VALUES ('nightly', 'every', 0, 1, NULL, '{ do = [\"reset\"] }')",
+        "INSERT INTO decision_table VALUES ('roaming', 1, 0, '{ free = ', 0)",
+        "INSERT INTO decision_table VALUES ('roaming', -1, 0, '{}', 0)",
+        "INSERT INTO schedule VALUES ('nightly', 'cron', NULL, NULL, 'never', '{ do = [\"reset\"] }', 0)",
+        "INSERT INTO schedule VALUES ('nightly', 'every', 0, 1, NULL, '{ do = [\"reset\"] }', 0)",
+        "DELETE FROM seal",
+        "UPDATE seal SET rows = rows - 1",
+        "DROP TRIGGER fact_gone; DELETE FROM fact WHERE id = 3; CREATE TRIGGER fact_gone AFTER DELETE ON fact BEGIN
+    UPDATE seal SET rows = rows - 1, crc = (crc + 4294967296 - OLD.crc) % 4294967296 WHERE name = 'fact'; END",
     ] {
         let folder = Folder::new();
         filled(&folder);
         rusqlite::Connection::open(folder.file()).unwrap().execute_batch(change).unwrap();
-        let error = read_all(&mut Knowledge::open(folder.file()).unwrap()).unwrap_err();
-        assert!(matches!(error, KnowledgeError::Damaged { .. }), "{change}: {error:?}");
+        for error in open_both(&folder.file()).map(Result::unwrap_err) {
+            assert!(matches!(error, KnowledgeError::Damaged { .. }), "{change}: {error:?}");
+        }
     }
 }
 

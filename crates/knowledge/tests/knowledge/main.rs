@@ -4,7 +4,9 @@
 
 mod damage;
 mod facts;
+mod flips;
 mod killed;
+mod power;
 mod round_trips;
 mod together;
 

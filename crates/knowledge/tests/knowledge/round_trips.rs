@@ -22,17 +22,26 @@ fn number() -> impl Strategy<Value = f64> {
     any::<f64>().prop_filter("finite", |x| x.is_finite())
 }
 
-/// What a decision maker can read: situations, and agents with weights.
-fn weights() -> impl Strategy<Value = Table> {
-    let agents = prop::collection::btree_map(any::<String>(), 0.0..=1.0, 0..5);
-    prop::collection::btree_map(any::<String>(), agents, 1..5).prop_map(|rows| {
-        let mut table = Table::new();
-        for (situation, agents) in rows {
-            let mut row = Table::new();
-            agents.into_iter().for_each(|(agent, weight)| row.set(&agent, Value::Float(weight)));
-            table.set(&situation, Value::Table(row));
-        }
-        table
+fn table_of(rows: impl IntoIterator<Item = (String, Value)>) -> Table {
+    let mut table = Table::new();
+    rows.into_iter().for_each(|(key, value)| table.set(&key, value));
+    table
+}
+
+/// What a decision maker can read: situations, and agents with weights or with more.
+pub(crate) fn weights() -> impl Strategy<Value = Table> {
+    let plain = || {
+        prop_oneof![
+            (0.0..=1.0).prop_map(Value::Float),
+            any::<bool>().prop_map(Value::Bool),
+            any::<String>().prop_map(Value::Text),
+        ]
+    };
+    let deeper = prop::collection::btree_map(any::<String>(), plain(), 0..3);
+    let entry = prop_oneof![3 => plain(), 1 => deeper.prop_map(|rows| Value::Table(table_of(rows)))];
+    let entries = prop::collection::btree_map(any::<String>(), entry, 0..5);
+    prop::collection::btree_map(".+", entries, 1..5).prop_map(|rows| {
+        table_of(rows.into_iter().map(|(row, entries)| (row, Value::Table(table_of(entries)))))
     })
 }
 
@@ -65,7 +74,7 @@ fn map() -> impl Strategy<Value = Map> {
     )
 }
 
-fn item() -> impl Strategy<Value = Item> {
+pub(crate) fn item() -> impl Strategy<Value = Item> {
     let source = prop_oneof![Just(String::new()), word()];
     prop_oneof![
         (word(), weights(), time())
@@ -155,6 +164,44 @@ fn a_table_keeps_the_versions_before() {
 }
 
 #[test]
+fn rows_may_say_more_than_weights() {
+    let folder = Folder::new();
+    let mut knowledge = Knowledge::open(folder.file()).unwrap();
+    let wall = [("weight", Value::Float(0.5)), ("importance", Value::Int(1)), ("rate", Value::Float(20.0))];
+    let wall = wall.into_iter().chain([("active", Value::Bool(true)), ("method", Value::from("left"))]);
+    let row = [
+        ("wall", Value::Table(table_of(wall.map(|(key, value)| (key.to_owned(), value))))),
+        ("track", Value::Float(0.25)),
+        ("priority", Value::Int(7)),
+        ("when", Value::from("battery < 0.2")),
+        ("goal", Value::from("home")),
+    ];
+    let mut rich = table("roaming", 0.5, 1);
+    rich.weights.set("free", Value::Table(table_of(row.map(|(key, value)| (key.to_owned(), value)))));
+    knowledge.put(rich.clone()).unwrap();
+    drop(knowledge);
+    let mut knowledge = Knowledge::open_read_only(folder.file()).unwrap();
+    let known = knowledge.read().unwrap();
+    assert_eq!(known.table("roaming").unwrap(), Some(rich));
+    assert_eq!(known.newest("roaming").unwrap().map(|version| version.number), Some(1));
+}
+
+#[test]
+fn a_write_of_somebody_else_is_seen_by_a_number() {
+    let folder = Folder::new();
+    let mut writer = Knowledge::open(folder.file()).unwrap();
+    writer.put(table("roaming", 0.1, 1)).unwrap();
+    let mut reader = Knowledge::open_read_only(folder.file()).unwrap();
+    let before = reader.writes().unwrap();
+    assert_eq!(reader.writes(), Ok(before), "nobody wrote");
+    writer.put(table("roaming", 0.2, 1)).unwrap();
+    let after = reader.writes().unwrap();
+    assert_ne!(after, before);
+    let newest = reader.read().unwrap().newest("roaming").unwrap().unwrap();
+    assert_eq!((newest.number, reader.writes()), (2, Ok(after)), "looking is no writing");
+}
+
+#[test]
 fn what_is_wrong_is_refused_whole_and_the_old_one_kept() {
     let folder = Folder::new();
     let mut knowledge = Knowledge::open(folder.file()).unwrap();
@@ -186,7 +233,28 @@ fn what_is_wrong_is_refused_whole_and_the_old_one_kept() {
         cells: vec![0; 4],
         time: Time::ZERO,
     };
-    let bad: [(Item, &str); 12] = [
+    let rich = |row: &str, key: &str, value: Value| {
+        let mut bad = table("roaming", 0.7, 2);
+        bad.weights.set(row, Value::Table(table_of([(key.to_owned(), value)])));
+        bad
+    };
+    let inner = |key: &str, value: Value| Value::Table(table_of([(key.to_owned(), value)]));
+    let bad: [(Item, &str); 18] = [
+        (rich("", "wall", Value::Int(1)).into(), "table \"roaming\": a row has no name"),
+        (
+            rich("free", "wall", inner("weight", Value::Float(1.5))).into(),
+            "table \"roaming\": \"weight\" of \"wall\" in \"free\" cannot be 1.5",
+        ),
+        (
+            rich("free", "wall", inner("rate", Value::Float(f64::NAN))).into(),
+            "\"rate\" of \"wall\" in \"free\" cannot be nan",
+        ),
+        (
+            rich("free", "wall", inner("rate", inner("deep", Value::Int(1)))).into(),
+            "\"rate\" of \"wall\" in \"free\" cannot be { deep = 1 }",
+        ),
+        (rich("free", "wall", Value::List(Vec::new())).into(), "the weight of \"wall\" in \"free\" is []"),
+        (rich("free", "priority", Value::Float(f64::INFINITY)).into(), "\"priority\" in \"free\" is inf"),
         (
             table("roaming", 1.5, 2).into(),
             "table \"roaming\": the weight of \"wall\" in \"free\" is 1.5, not a number from 0 to 1",

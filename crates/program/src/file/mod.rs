@@ -12,13 +12,14 @@
 //! | TOML to a tree of values | `tree` |
 //! | built-in scenarios and worlds, and files by name | `library` |
 //! | `--set KEY=VALUE` | `set` |
-//! | the tree to a plan, with all mistakes | `read`, with `agent`, `group`, `wires`, `decide`, `requests` |
+//! | the tree to a plan, with all mistakes | `read`, with `agent`, `group`, `wires`, `decide`, `knowledge`, `requests` |
 //! | the plan to a text | `write` |
 
 mod agent;
 mod burden;
 mod decide;
 mod group;
+pub(crate) mod knowledge;
 mod library;
 mod read;
 mod requests;

@@ -16,10 +16,10 @@ use super::group::Names;
 use super::library::Shelf;
 use super::sources::{Mistakes, Sources};
 use super::wires::Written;
-use super::{burden, decide, set, tree};
+use super::{burden, decide, knowledge, set, tree};
 
 /// The sections of a system file.
-pub(crate) const SECTIONS: [&str; 13] = [
+pub(crate) const SECTIONS: [&str; 14] = [
     "name",
     "world",
     "processors",
@@ -29,6 +29,7 @@ pub(crate) const SECTIONS: [&str; 13] = [
     "queue",
     "wires",
     "decide",
+    "knowledge",
     "goal",
     "vary",
     "burden",
@@ -52,6 +53,8 @@ pub struct Loaded {
     pub folder: PathBuf,
     /// The texts it was read from, for mistakes that are found later.
     pub sources: Sources,
+    /// The store that its section `[knowledge]` names.
+    pub store: Option<PathBuf>,
 }
 
 /// Finds a system file by its path or the name of a built-in scenario, does the `KEY=VALUE` changes to it, and reads it.
@@ -170,12 +173,20 @@ impl<'r> Reader<'r> {
         }
     }
 
-    fn finish(mut self) -> Result<Loaded, Mistakes> {
+    /// A reader that goes on where a system was read, with what is not yet in its plan.
+    pub(super) fn over(loaded: &Loaded, registry: &'r Registry) -> Reader<'r> {
+        let robots = loaded.plan.section(ROBOT).cloned().unwrap_or_default();
+        let (plan, sources, world) = (loaded.plan.clone(), loaded.sources.clone(), loaded.world.clone());
+        Reader { plan, sources, world, robots, ..Reader::new(registry, &loaded.folder) }
+    }
+
+    pub(super) fn finish(mut self) -> Result<Loaded, Mistakes> {
         self.mistakes.sort_by_key(|mistake| mistake.at.start);
         self.mistakes.dedup();
         if self.mistakes.is_empty() {
             let Reader { plan, world, folder, sources, .. } = self;
-            Ok(Loaded { plan, world, folder, sources })
+            let store = knowledge::store(&plan, &folder);
+            Ok(Loaded { plan, world, folder, sources, store })
         } else {
             Err(Mistakes { sources: self.sources, list: self.mistakes })
         }
@@ -195,6 +206,7 @@ impl<'r> Reader<'r> {
         self.requests(tree);
         decide::read(self, tree);
         burden::read(self, tree);
+        knowledge::read(self, tree);
         self.read_world(tree);
         let judged = runtime::check(&self.plan, self.registry);
         let spoiled = &self.spoiled;

@@ -18,6 +18,7 @@ use record::log::{Clock, Message, ROSOUT, Reader};
 use runtime::{Incident, Plan, Refusal, Request, TimedRequest};
 use types::{Duration, Time};
 
+use super::knowing::{self, Firing};
 use crate::error::Failure;
 
 /// Who asks from outside, in the notes of a log.
@@ -43,7 +44,7 @@ pub(super) enum Deed {
 }
 
 impl Deed {
-    fn read(words: &[String]) -> Option<Deed> {
+    pub(super) fn read(words: &[String]) -> Option<Deed> {
         let (verb, rest) = words.split_first()?;
         match verb.as_str() {
             "stop" => Some(Deed::Stop(rest.join(" "))),
@@ -69,8 +70,21 @@ pub(super) struct Due {
     pub(super) deed: Deed,
     /// Who asked.
     pub(super) by: &'static str,
+    /// Whose incident it is: who asked, or the schedule that did.
+    pub(super) of: String,
     /// Waits until it is done.
     pub(super) done: Option<SyncSender<()>>,
+}
+
+/// Where a timed request of the runtime comes from.
+#[derive(Clone, Debug, PartialEq, Eq)]
+enum Origin {
+    /// The plan itself.
+    Plan,
+    /// A schedule of the store, as incidents call it.
+    Schedule(String),
+    /// A repeated log; with the words.
+    Log(Vec<String>),
 }
 
 /// What is asked of one run. Clones are the same.
@@ -80,13 +94,14 @@ pub(crate) struct Asked(Arc<Mutex<Inner>>);
 #[derive(Debug, Default)]
 struct Inner {
     over: bool,
-    waiting: VecDeque<(Deed, SyncSender<()>)>,
-    /// By time, counted from the start.
-    timed: VecDeque<(Duration, &'static str, Deed)>,
+    /// With whose incident it is.
+    waiting: VecDeque<(Deed, String, SyncSender<()>)>,
+    /// By time, counted from the start; who asks, and whose incident it is.
+    timed: VecDeque<(Duration, &'static str, String, Deed)>,
     /// Requests on their way to the runtime: how it will write them down, and their words.
     under_way: Vec<(String, String)>,
-    /// For each timed request of the runtime, in the order of time: whether it comes from a repeated log.
-    repeated: Vec<bool>,
+    /// Where each timed request of the runtime comes from, in the order of time.
+    origins: Vec<Origin>,
     /// How many of them were told.
     told: usize,
     /// When the repeated run was asked to quit.
@@ -105,33 +120,43 @@ pub(super) fn is_fault(incident: &Incident) -> bool {
 }
 
 impl Asked {
-    /// Takes out of a plan what the runtime does not do, and adds what was asked in a log.
-    pub(super) fn of(plan: &mut Plan, repeat: Option<&Repeat>) -> Asked {
+    /// Takes out of a plan what the runtime does not do, and adds what schedules ask and what was asked in a log.
+    pub(super) fn of(plan: &mut Plan, firings: Vec<Firing>, repeat: Option<&Repeat>) -> Asked {
         let mut inner = Inner::default();
         let mut requests = Vec::new();
         for request in std::mem::take(&mut plan.requests) {
             match Deed::read(&request.words) {
-                Some(deed) => inner.timed.push_back((request.at, PLAN, deed)),
-                None => requests.push((false, request)),
+                Some(deed) => inner.timed.push_back((request.at, PLAN, PLAN.to_owned(), deed)),
+                None => requests.push((Origin::Plan, request)),
+            }
+        }
+        for Firing { at, schedule, words } in firings {
+            match Deed::read(&words) {
+                Some(deed) => inner.timed.push_back((at, PLAN, schedule, deed)),
+                None => {
+                    let request = TimedRequest { at, words, place: Default::default() };
+                    requests.push((Origin::Schedule(schedule), request));
+                }
             }
         }
         for (time, words) in repeat.map_or(&[][..], |repeat| &repeat.asked) {
             let at = time.since_start();
             match Deed::read(words) {
-                Some(deed) => inner.timed.push_back((at, OUTSIDE, deed)),
+                Some(deed) => inner.timed.push_back((at, OUTSIDE, OUTSIDE.to_owned(), deed)),
                 None => {
                     if words == &["quit"] {
                         inner.quits.get_or_insert(*time);
                     }
                     let words = words.clone();
-                    requests.push((true, TimedRequest { at, words, place: Default::default() }));
+                    let origin = Origin::Log(words.clone());
+                    requests.push((origin, TimedRequest { at, words, place: Default::default() }));
                 }
             }
         }
-        // Stable, as the runtime's own order: what the plan asks comes before what people ask at the same instant.
-        inner.timed.make_contiguous().sort_by_key(|(at, _, _)| *at);
+        // Stable, as the runtime's own order: what the plan and the schedules ask comes before what people ask at the same instant.
+        inner.timed.make_contiguous().sort_by_key(|(at, ..)| *at);
         requests.sort_by_key(|(_, request)| request.at);
-        (inner.repeated, plan.requests) = requests.into_iter().unzip();
+        (inner.origins, plan.requests) = requests.into_iter().unzip();
         Asked(Arc::new(Mutex::new(inner)))
     }
 
@@ -141,6 +166,11 @@ impl Asked {
 
     /// Has a deed done at the judge's next look, and waits for it.
     pub(super) fn act(&self, deed: Deed) -> Result<(), Refusal> {
+        self.act_for(OUTSIDE, deed)
+    }
+
+    /// The same, with the name that incidents shall have for whoever asks.
+    pub(super) fn act_for(&self, who: &str, deed: Deed) -> Result<(), Refusal> {
         let gone = || Refusal::new("the system has ended");
         let (done, is_done) = sync_channel(1);
         {
@@ -148,7 +178,7 @@ impl Asked {
             if inner.over {
                 return Err(gone());
             }
-            inner.waiting.push_back((deed, done));
+            inner.waiting.push_back((deed, who.to_owned(), done));
         }
         is_done.recv().map_err(|_| gone())
     }
@@ -157,10 +187,11 @@ impl Asked {
     pub(super) fn due(&self, since_start: Duration) -> Vec<Due> {
         let mut inner = self.inner();
         let mut due = Vec::new();
-        while inner.timed.front().is_some_and(|(at, _, _)| *at <= since_start) {
-            due.extend(inner.timed.pop_front().map(|(_, by, deed)| Due { deed, by, done: None }));
+        while inner.timed.front().is_some_and(|(at, ..)| *at <= since_start) {
+            due.extend(inner.timed.pop_front().map(|(_, by, of, deed)| Due { deed, by, of, done: None }));
         }
-        due.extend(inner.waiting.drain(..).map(|(deed, done)| Due { deed, by: OUTSIDE, done: Some(done) }));
+        let waiting = inner.waiting.drain(..);
+        due.extend(waiting.map(|(deed, of, done)| Due { deed, by: OUTSIDE, of, done: Some(done) }));
         due
     }
 
@@ -218,13 +249,14 @@ impl Asked {
         if who == PLAN {
             let at = inner.told;
             inner.told += 1;
-            if !inner.repeated.get(at).copied().unwrap_or(false) {
-                return None;
-            }
+            let Some(Origin::Log(words)) = inner.origins.get(at) else { return None };
+            // The runtime joins words with blanks. In the log that is repeated they stood as they can be read again.
+            let outcome = said.strip_prefix(&words.join(" ")).unwrap_or_default();
+            let text = format!("{ASKED}{}{outcome}", words::join(words));
             if said == "quit" {
                 inner.quits = None;
             }
-            return Some(text.to_owned());
+            return Some(text);
         }
         if who != OUTSIDE {
             return None;
@@ -246,9 +278,13 @@ impl Asked {
         self.inner().quits.take().map(|time| (time, format!("{ASKED}quit")))
     }
 
-    /// Whether the timed request of this number, in the order of time, comes from a repeated log.
-    pub(super) fn is_repeated(&self, number: usize) -> bool {
-        self.inner().repeated.get(number).copied().unwrap_or(false)
+    /// Whose the timed request of this number is, in the order of time, where it is not the plan's.
+    pub(super) fn origin(&self, number: usize) -> Option<String> {
+        match self.inner().origins.get(number)? {
+            Origin::Plan => None,
+            Origin::Schedule(name) => Some(name.clone()),
+            Origin::Log(_) => Some(LOG.to_owned()),
+        }
     }
 }
 
@@ -264,6 +300,8 @@ pub(super) struct Repeat {
     pub(super) plan: String,
     /// From what its chance was drawn.
     pub(super) seed: u64,
+    /// What it read of its store, as its log tells it.
+    pub(super) known: Option<String>,
     /// What was asked from outside, in order.
     pub(super) asked: Vec<(Time, Vec<String>)>,
 }
@@ -301,7 +339,8 @@ impl Repeat {
                 asked.push((message.time, words));
             }
         }
-        Ok(Repeat { path: path.to_owned(), plan: run.plan, seed: run.seed.unwrap_or_default(), asked })
+        let (seed, known) = (run.seed.unwrap_or_default(), run.notes.get(knowing::NOTE).cloned());
+        Ok(Repeat { path: path.to_owned(), plan: run.plan, seed, known, asked })
     }
 }
 
@@ -371,7 +410,7 @@ mod tests {
     fn log_of(asked: &[(i64, &str)]) -> Repeat {
         let asked =
             asked.iter().map(|(at, said)| (Time::ZERO + Duration::secs(*at), words::split(said).unwrap()));
-        Repeat { path: PathBuf::new(), plan: String::new(), seed: 1, asked: asked.collect() }
+        Repeat { path: PathBuf::new(), plan: String::new(), seed: 1, known: None, asked: asked.collect() }
     }
 
     #[test]
@@ -380,16 +419,37 @@ mod tests {
             requests: vec![timed(9, "fault a off"), timed(2, "stop"), timed(3, "fault b off")],
             ..Plan::default()
         };
-        let asked = Asked::of(&mut plan, Some(&log_of(&[(3, "fault c off"), (4, "reset"), (9, "quit")])));
+        let firing = |at: i64, words: &str| {
+            let TimedRequest { at, words, .. } = timed(at, words);
+            Firing { at, schedule: "schedule bell".into(), words }
+        };
+        let firings = vec![firing(3, "fault d off"), firing(4, "stop"), firing(5, "reset")];
+        let log = log_of(&[(3, "fault c off"), (4, "reset"), (9, "quit")]);
+        let asked = Asked::of(&mut plan, firings, Some(&log));
         let order: Vec<&str> =
-            plan.requests.iter().map(|request| request.words.last().unwrap().as_str()).collect();
-        assert_eq!(order, ["off", "off", "off", "quit"]);
-        assert_eq!(plan.requests[1].words[1], "c");
-        assert_eq!([0, 1, 2, 3, 4].map(|n| asked.is_repeated(n)), [false, true, false, true, false]);
-        let due =
-            |at| asked.due(Duration::secs(at)).into_iter().map(|due| (due.by, due.deed)).collect::<Vec<_>>();
+            plan.requests.iter().map(|request| request.words.get(1).map_or("quit", String::as_str)).collect();
+        assert_eq!(order, ["b", "d", "c", "a", "quit"]);
+        let origins = [0, 1, 2, 3, 4, 5].map(|n| asked.origin(n));
+        let origins = origins.each_ref().map(Option::as_deref);
+        assert_eq!(origins, [None, Some("schedule bell"), Some(LOG), None, Some(LOG), None]);
+        let due = |at| {
+            asked
+                .due(Duration::secs(at))
+                .into_iter()
+                .map(|due| (due.by, due.of, due.deed))
+                .collect::<Vec<_>>()
+        };
         assert_eq!(due(1), []);
-        assert_eq!(due(5), [(PLAN, Deed::Stop(String::new())), (OUTSIDE, Deed::Reset)]);
+        let (bell, stop) = ("schedule bell".to_owned(), Deed::Stop(String::new()));
+        assert_eq!(
+            due(5),
+            [
+                (PLAN, PLAN.to_owned(), stop.clone()),
+                (PLAN, bell.clone(), stop),
+                (OUTSIDE, OUTSIDE.to_owned(), Deed::Reset),
+                (PLAN, bell, Deed::Reset)
+            ]
+        );
         assert_eq!(due(6), []);
     }
 
@@ -415,6 +475,15 @@ mod tests {
             assert_eq!(asked.told(who, "asked the router: wire a.b c.d"), None);
         }
         assert_eq!(understood("Send { port: \"a.b\" }"), None);
+    }
+
+    #[test]
+    fn words_with_blanks_are_written_down_in_a_repeated_run_as_they_were_before() {
+        let said = "set wall 'side=far left'";
+        let asked = Asked::of(&mut Plan::default(), Vec::new(), Some(&log_of(&[(3, said), (4, said)])));
+        assert_eq!(asked.told(PLAN, "asked: set wall side=far left").unwrap(), format!("asked: {said}"));
+        let refused = asked.told(PLAN, "asked: set wall side=far left; refused: no").unwrap();
+        assert_eq!(refused, format!("asked: {said}; refused: no"));
     }
 
     #[test]

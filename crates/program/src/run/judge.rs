@@ -155,7 +155,7 @@ impl Judge {
                 Deed::Interrupt => ends = true,
             }
             self.note(now, due.by, &due.deed);
-            self.asked.done(Incident { time: now, agent: due.by.to_owned(), what: due.deed.note() });
+            self.asked.done(Incident { time: now, agent: due.of, what: due.deed.note() });
             if let Some(done) = due.done {
                 // Whoever asked may be gone.
                 let _ = done.try_send(());

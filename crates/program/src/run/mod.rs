@@ -9,6 +9,7 @@
 mod asked;
 mod burden;
 mod judge;
+mod knowing;
 mod options;
 mod prepare;
 mod recorder;
@@ -36,6 +37,7 @@ use crate::signals::Signals;
 use crate::{figures, file, terminal};
 use asked::Repeat;
 use burden::Burdens;
+use knowing::Knowing;
 
 pub(crate) use asked::Asked;
 pub(crate) use burden::{BurdenArgs, burden};
@@ -59,11 +61,15 @@ pub(crate) fn run(args: &RunArgs, registry: Registry, json: bool) -> Result<Exit
     let signals = Signals::take()
         .map_err(|error| Failure::new(format!("signals cannot be handled: {error}")).code(1))?;
     let scenario = options::scenario(args, with_robots(registry))?;
-    if let Some(range) = args.seeds {
-        return seeds::run(args, &scenario, range, signals.asked_to_end(), json);
-    }
     let name = &scenario.file.plan.name;
     let repeat = args.repeat.as_ref().map(|path| Repeat::read(path, name)).transpose()?;
+    let (scenario, knowing) = knowing::begin(scenario, repeat.as_ref(), terminal::tell)?;
+    let scenario = options::only(args, scenario)?;
+    let knowing = knowing.as_ref();
+    if let Some(range) = args.seeds {
+        return seeds::run(args, &scenario, knowing, range, signals.asked_to_end(), json);
+    }
+    let name = &scenario.file.plan.name;
     let seed = repeat.as_ref().map_or(args.seed, |repeat| repeat.seed);
     let ready = scenario.prepare(seed)?;
     let clock = options::clock(args, &ready)?;
@@ -79,8 +85,8 @@ pub(crate) fn run(args: &RunArgs, registry: Registry, json: bool) -> Result<Exit
     let asked_to_end = signals.asked_to_end().clone();
     let watched = !json && terminal::watched();
     let place = Place::of(args, name, seed)?;
-    let whole =
-        One { args, scenario: &scenario, seed, clock, watched, place, asked_to_end, serves: true, repeat };
+    let (scenario, serves) = (&scenario, true);
+    let whole = One { args, scenario, seed, clock, watched, place, asked_to_end, serves, repeat, knowing };
     let summary = whole.run(ready)?;
     if json {
         terminal::say_json(&summary.to_json());
@@ -149,12 +155,15 @@ struct One<'a> {
     serves: bool,
     /// The log of the run that this one repeats.
     repeat: Option<Repeat>,
+    /// What it knows from a store.
+    knowing: Option<&'a Knowing>,
 }
 
 impl One<'_> {
     fn run(&self, ready: Ready) -> Result<Summary, Failure> {
         let mut plan = ready.plan.clone();
-        let asked = Asked::of(&mut plan, self.repeat.as_ref());
+        let firings = self.knowing.map(|knowing| knowing.firings(self.clock, self.limit(&ready)));
+        let asked = Asked::of(&mut plan, firings.unwrap_or_default(), self.repeat.as_ref());
         let log = self.log(&ready, &asked)?;
         let facts = log.as_ref().map(|(_, facts, _)| facts.clone());
         let judge = judge::Judge::new(&ready, self.asked_to_end.clone(), asked.clone(), facts);
@@ -237,7 +246,7 @@ impl One<'_> {
                 ClockChoice::Wall => record::log::Clock::Wall,
             },
             plan: plan_text(ready),
-            notes: figures::notes(ready),
+            notes: figures::notes(ready).into_iter().chain(self.knowing.map(Knowing::note)).collect(),
         };
         let facts = judge::Facts::default();
         let file = recorder::LogFile::create(path, &run, self.args.images, facts.clone(), asked.clone());
@@ -292,6 +301,7 @@ impl One<'_> {
             burdens: (self.clock == ClockChoice::Wall)
                 .then(|| Burdens::start(file::burdens(&ready.plan)))
                 .flatten(),
+            looking: self.knowing.and_then(|knowing| knowing.look(&control, asked, self.clock)),
             screen: if self.watched { Some(screen::Screen::start(ready, control)?) } else { None },
         })
     }
@@ -321,12 +331,14 @@ impl One<'_> {
 struct Beside {
     burdens: Option<Burdens>,
     server: Option<serve::Serving>,
+    looking: Option<knowing::Looking>,
     screen: Option<screen::Screen>,
 }
 
 impl Beside {
     fn end(self) {
         drop(self.burdens);
+        drop(self.looking);
         drop(self.server);
         drop(self.screen);
     }
@@ -410,6 +422,7 @@ mod tests {
             asked_to_end,
             serves: false,
             repeat: None,
+            knowing: None,
         };
         one.run(ready).unwrap()
     }

@@ -8,14 +8,16 @@ use record::log::Reader;
 use runtime::{Plan, Registry};
 use types::value::Value;
 
+use super::knowing;
 use super::prepare::{Ready, Scenario};
 use crate::cli::{ClockChoice, RunArgs};
 use crate::error::Failure;
 use crate::{figures, file};
 
-/// Reads the system file, with the changes that the command line makes to it.
+/// Reads the system file, with the changes that the command line makes to its entries.
 pub(super) fn scenario(args: &RunArgs, registry: Registry) -> Result<Scenario, Failure> {
-    let mut loaded = file::load(&args.system, &args.set, &registry)?;
+    let mut loaded = file::load(&args.system, &knowing::sets(args), &registry)?;
+    loaded.store = args.know.clone().or(loaded.store);
     if let Some(from) = &args.from {
         let (driver, folder) = recording(from)?;
         let robots = loaded.plan.section("robot").map(|robots| robots.rows()).unwrap_or_default();
@@ -40,11 +42,16 @@ pub(super) fn scenario(args: &RunArgs, registry: Registry) -> Result<Scenario, F
         return Err(Failure::new("the scenario \"recorded\" needs the file of a recorded robot")
             .help("name it, as in: sinew run recorded --from fr079.log"));
     }
+    Ok(Scenario { file: loaded, registry })
+}
+
+/// Leaves the agents that the command line wants, if it names any. What a store holds is for the whole system, so it is read before.
+pub(super) fn only(args: &RunArgs, mut scenario: Scenario) -> Result<Scenario, Failure> {
     if !args.only.is_empty() {
         let names: Vec<String> = args.only.iter().map(|name| name.trim().to_owned()).collect();
-        loaded.plan.only(&names).map_err(runtime::Refusal::from)?;
+        scenario.file.plan.only(&names).map_err(runtime::Refusal::from)?;
     }
-    Ok(Scenario { file: loaded, registry })
+    Ok(scenario)
 }
 
 /// The built-in scenario that is nothing without a file.

@@ -7,6 +7,7 @@ use std::sync::{Arc, Mutex, PoisonError};
 
 use serde_json::{Value as Json, json};
 
+use super::knowing::Knowing;
 use super::prepare::Scenario;
 use super::summary::{Summary, seconds, table};
 use super::{One, Place, options};
@@ -18,6 +19,7 @@ use crate::terminal;
 pub(super) fn run(
     args: &RunArgs,
     scenario: &Scenario,
+    knowing: Option<&Knowing>,
     range: Seeds,
     asked_to_end: &Arc<AtomicBool>,
     json: bool,
@@ -27,7 +29,8 @@ pub(super) fn run(
             .help("--out DIR gives each a folder of its own"));
     }
     let begun = terminal::host_now();
-    let done = all(args, scenario, range, asked_to_end)?;
+    let knowing = knowing.map(Knowing::still);
+    let done = all(args, scenario, knowing.as_ref(), range, asked_to_end)?;
     let took = begun.elapsed().as_secs_f64();
     let met = done.values().filter(|summary| summary.is_success()).count();
     if json {
@@ -43,6 +46,7 @@ pub(super) fn run(
 fn all(
     args: &RunArgs,
     scenario: &Scenario,
+    knowing: Option<&Knowing>,
     range: Seeds,
     asked_to_end: &Arc<AtomicBool>,
 ) -> Result<BTreeMap<u64, Summary>, Failure> {
@@ -60,7 +64,7 @@ fn all(
                     if seed > range.last || failed.lock().unwrap_or_else(PoisonError::into_inner).is_some() {
                         return;
                     }
-                    match one(args, scenario, seed, asked_to_end) {
+                    match one(args, scenario, knowing, seed, asked_to_end) {
                         Ok(summary) => {
                             done.lock().unwrap_or_else(PoisonError::into_inner).insert(seed, summary);
                             bar.inc(1);
@@ -88,6 +92,7 @@ fn all(
 fn one(
     args: &RunArgs,
     scenario: &Scenario,
+    knowing: Option<&Knowing>,
     seed: u64,
     asked_to_end: &Arc<AtomicBool>,
 ) -> Result<Summary, Failure> {
@@ -98,8 +103,8 @@ fn one(
         None => None,
     };
     let asked_to_end = asked_to_end.clone();
-    One { args, scenario, seed, clock, watched: false, place, asked_to_end, serves: false, repeat: None }
-        .run(ready)
+    let (watched, serves, repeat) = (false, false, None);
+    One { args, scenario, seed, clock, watched, place, asked_to_end, serves, repeat, knowing }.run(ready)
 }
 
 fn text(name: &str, range: Seeds, done: &BTreeMap<u64, Summary>, took: f64) -> String {

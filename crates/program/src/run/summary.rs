@@ -9,6 +9,7 @@ use types::{Duration, Time};
 
 use super::asked::{self, Asked};
 use super::judge;
+use super::knowing;
 use super::prepare::Ready;
 use super::recorder::LogOutcome;
 use crate::terminal::paint;
@@ -139,12 +140,12 @@ impl Summary {
         }
     }
 
-    /// Says of the requests of a repeated log that the plan did not ask for them.
+    /// Says of the requests of a repeated log, and of those of schedules, that the plan did not ask for them.
     pub(crate) fn repeats(&mut self, asked: &Asked) {
         let timed = self.incidents.iter_mut().filter(|incident| incident.agent == asked::PLAN);
         for (number, incident) in timed.enumerate() {
-            if asked.is_repeated(number) {
-                incident.agent = asked::LOG.into();
+            if let Some(whose) = asked.origin(number) {
+                incident.agent = whose;
             }
         }
     }
@@ -436,9 +437,25 @@ impl Summary {
             if let Some(effect) = self.effect_of(incident) {
                 text += &format!("; {effect}");
             }
+            let more = self.asked_again(i);
+            if let Some(last) = more.last() {
+                let last = seconds(self.since(self.incidents[*last].time));
+                text += &format!(", and {} more times until {last}", more.len());
+                more.iter().for_each(|later| done[*later] = true);
+            }
             told.push(text);
         }
         told
+    }
+
+    /// When a schedule asked for the same later, and the same became of it.
+    fn asked_again(&self, first: usize) -> Vec<usize> {
+        let Incident { agent, what, .. } = &self.incidents[first];
+        if !knowing::is_schedule(agent) {
+            return Vec::new();
+        }
+        let same = |later: &Incident| later.agent == *agent && later.what == *what;
+        (first + 1..self.incidents.len()).filter(|later| same(&self.incidents[*later])).collect()
     }
 
     /// Asking for real time and not getting it is said aloud.
@@ -491,7 +508,7 @@ fn happened(incident: &Incident, at: &str) -> String {
         asked::PLAN => Some("the plan"),
         asked::LOG => Some("the log"),
         asked::OUTSIDE => Some("somebody"),
-        _ => None,
+        schedule => knowing::is_schedule(schedule).then_some(schedule),
     };
     if let Some(who) = who.filter(|_| what.starts_with("asked: ")) {
         return format!(

@@ -126,6 +126,27 @@ fn a_queue_is_read_with_the_wires_to_it_and_from_it() {
 }
 
 #[test]
+fn the_store_of_a_system_survives_and_lies_beside_its_file() {
+    let text = r#"
+        name = "home"
+        [agent.decision]
+        is = "decision-maker"
+        period = "100ms"
+        [decide]
+        free = { decision = 1.0 }
+        [knowledge]
+        file = "../home.db"
+        begins = "2026-03-02 07:59"
+        decide = "home"
+    "#;
+    let folder = std::path::Path::new("some");
+    let loaded = file::read(text, "home.toml", Some(folder), &[], &registry());
+    let loaded = loaded.unwrap_or_else(|mistakes| panic!("{mistakes}"));
+    assert_eq!(loaded.store, Some("some/../home.db".into()));
+    assert_eq!(again(&loaded.plan), bare(loaded.plan));
+}
+
+#[test]
 fn a_change_changes_one_entry_and_nothing_else() {
     let sets = ["agent.drive.period=40ms".to_owned()];
     let mut wanted = bare(file::load("exploration", &[], &registry()).unwrap().plan);

@@ -30,6 +30,9 @@ fn it_agrees_with_every_scenario() {
     let wire = |recipient| format!("wires.\"a.b\" = {{ to = \"c.d\", every = 2, recipient = {recipient} }}");
     assert_eq!(said(&wire("\"c\"")), None);
     assert!(said(&wire("3")).is_some_and(|error| error.contains("recipient")));
+    let knows = "knowledge = { file = \"home.db\", begins = \"2026-03-02 07:59\", decide = \"home\" }";
+    assert_eq!(said(knows), None);
+    assert!(said(&knows.replace("file", "fiel")).is_some_and(|error| error.contains("fiel")));
 }
 
 #[test]
