@@ -151,15 +151,26 @@ impl System {
     /// # Errors
     /// As [`System::analyse`].
     pub fn is_feasible(&self) -> Result<bool, Unsound> {
+        self.do_meet(|_| true)
+    }
+
+    /// Whether those that are asked for meet their deadlines; who does not run in real time is none of them.
+    ///
+    /// # Errors
+    /// As [`System::analyse`].
+    pub fn do_meet(&self, is_asked_for: impl Fn(usize) -> bool) -> Result<bool, Unsound> {
         let whole = Whole::of(self)?;
         let misses = |responses: &[Option<i128>]| {
             let mut all = responses.iter().zip(&whole.agents).enumerate();
             all.any(|(at, (response, agent))| {
-                self.is_in_real_time(at) && response.is_none_or(|response| response > agent.deadline)
+                is_asked_for(at)
+                    && self.is_in_real_time(at)
+                    && response.is_none_or(|response| response > agent.deadline)
             })
         };
-        // Responses only grow from round to round: who misses once misses.
-        let (_, responses) = whole.settle(misses);
+        // Responses only grow from round to round: who misses once misses. Not so where lateness makes a burst of messages that a gap keeps apart.
+        let grow = !whole.may_burst();
+        let (_, responses) = whole.settle(|responses| grow && misses(responses));
         Ok(!misses(&responses))
     }
 
@@ -317,6 +328,24 @@ impl Whole<'_> {
         (streams, responses)
     }
 
+    /// Whether it depends on how late others are if the gap between its steps is what bounds an agent.
+    fn may_burst(&self) -> bool {
+        let with_gap = |at: &usize| self.agents[*at].least_gap > 0;
+        if !(0..self.agents.len()).any(|at| with_gap(&at)) {
+            return false;
+        }
+        // Periods, unlike lateness, are the same in all rounds.
+        let streams = self.streams(&vec![Some(0); self.agents.len()]);
+        (0..self.agents.len()).filter(with_gap).any(|at| {
+            let by_others = streams[at].iter().filter(|flow| flow.after.is_some());
+            by_others.clone().next().is_some()
+                && by_others
+                    .map(|flow| self.agents[at].least_gap as f64 / flow.row.period as f64)
+                    .sum::<f64>()
+                    < 1.0
+        })
+    }
+
     /// What makes each agent run when the others take so long.
     fn streams(&self, responses: &[Option<i128>]) -> Streams {
         let mut streams: Streams = vec![Vec::new(); self.agents.len()];
@@ -348,7 +377,7 @@ impl Whole<'_> {
             let gap = numbers.least_gap;
             let rate: f64 = by_others.iter().map(|flow| gap as f64 / flow.row.period as f64).sum();
             let burst = by_others.iter().any(|flow| flow.row.jitter > gap);
-            if gap > 0 && (rate > 1.0 || burst) {
+            if gap > 0 && (rate >= 1.0 || burst) {
                 // Steps begin so far apart, whatever comes.
                 let after = by_others.first().and_then(|flow| flow.after);
                 by_others = vec![flow(gap, 0, after, 0)];
@@ -392,9 +421,12 @@ impl Whole<'_> {
             if !self.system.goes_before(agent.executor, own) || (other == at && streams[at].len() < 2) {
                 continue;
             }
-            let late = if other == at { Some(numbers.deadline) } else { before[other] }?;
-            let work =
-                streams[other].iter().map(|flow| Carried { row: flow.row, late: flow.row.jitter + late });
+            // Who has no bound himself leaves no more behind than one who passes releases over, or whose mailbox is full.
+            let late = |flow: &Flow| match other == at {
+                true => flow.row.jitter + numbers.deadline,
+                false => lateness(flow, before[other]),
+            };
+            let work = streams[other].iter().map(|flow| Carried { row: flow.row, late: late(flow) });
             if agent.executor == own { beside.extend(work) } else { above.extend(work) }
         }
         // One step at a time: the one before must be over when the next message comes.

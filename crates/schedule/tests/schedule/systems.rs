@@ -144,6 +144,17 @@ fn a_step_that_is_asked_for_counts_as_one_of_a_clock_and_answers_nobody() {
     assert_eq!(responses(&system), [Some(n(1)), Some(n(3))]);
 }
 
+#[test]
+fn who_has_no_bound_takes_it_from_nobody_who_has_another_processor() {
+    // 9 of 10 on the first processor leave too little for 6 of 50 there. Below both 10 of 100 may run on the second one, too: of what goes before
+    // it, half counts. At 34 that is 27 + 4 of the first, and of the second what was left, what is new and what comes next, 3 * 6: 10 + 49 / 2.
+    let agents = vec![agent(9, 10, 0, clock(10)), agent(6, 50, 1, clock(50)), agent(10, 100, 2, clock(100))];
+    let threads =
+        [(65, 1), (50, 1), (40, 3)].map(|(priority, may)| Executor { priority: Some(priority), may });
+    let system = System { processors: 2, agents, executors: threads.into() };
+    assert_eq!(responses(&system), [Some(n(9)), None, Some(n(34))]);
+}
+
 #[derive(Clone, Debug)]
 pub(crate) struct Drawn {
     pub system: System,
@@ -286,6 +297,17 @@ proptest! {
     #[test]
     fn no_step_takes_longer_than_told(drawn in drawn()) {
         prop_assert_eq!(contradicted(&drawn, &responses(&drawn.system)), None);
+    }
+
+    #[test]
+    fn the_quick_verdict_is_that_of_the_analysis(drawn in drawn(), gaps in proptest::collection::vec(0i128..90, 6)) {
+        let mut system = drawn.system;
+        system.agents.iter_mut().zip(gaps).for_each(|(agent, gap)| agent.least_gap = n(gap));
+        let found = system.analyse().unwrap();
+        prop_assert_eq!(system.is_feasible().unwrap(), found.iter().all(|found| found.meets));
+        for at in 0..found.len() {
+            prop_assert_eq!(system.do_meet(|asked| asked == at).unwrap(), found[at].meets);
+        }
     }
 }
 
