@@ -2,8 +2,8 @@
 //!
 //! An executor is a thread with a priority that runs its agents one after another: they do not interrupt each other, and each may have to wait for
 //! the step of another that has just begun. Whoever is of a higher executor that may run on one of the same processors goes before. An agent
-//! runs by the clock, by what comes from outside, or because another one has sent it something: then it inherits the other's period, and is as
-//! late as that one's step may end. What makes it run is its *streams*, and each is a task of its own to the tests.
+//! runs by the clock, by what comes from outside, at a time that it asked for, or because another one has sent it something: then it inherits the
+//! other's period, and is as late as that one's step may end. What makes it run is its *streams*, and each is a task of its own to the tests.
 //!
 //! The bounds are those of holistic analysis (Tindell and Clark 1994): responses and the lateness that they cause are reckoned in turns until
 //! nothing changes. They hold for executors that may run on several processors, too: as long as one waits, one of its processors is at work for
@@ -52,13 +52,18 @@ pub enum Source {
         /// The time between two of them.
         period: Exact,
     },
+    /// It asks for the step itself, when it likes.
+    Asked {
+        /// The least time between two of them.
+        least: Exact,
+    },
 }
 
 impl Source {
-    /// Whose messages they are; nothing for the clock.
+    /// Whose messages they are; nothing for the clock, and for what it asks itself.
     pub fn agent(&self) -> Option<usize> {
         match self {
-            Source::Clock { .. } => None,
+            Source::Clock { .. } | Source::Asked { .. } => None,
             Source::After { agent, .. } | Source::Paced { agent, .. } => Some(*agent),
         }
     }
@@ -108,7 +113,7 @@ pub struct Stream {
     pub period: Exact,
     /// How late one may be.
     pub jitter: Exact,
-    /// Whose message it is; nothing for the clock.
+    /// Whose message it is; nothing for the clock, and for what it asks itself.
     pub after: Option<usize>,
 }
 
@@ -146,15 +151,26 @@ impl System {
     /// # Errors
     /// As [`System::analyse`].
     pub fn is_feasible(&self) -> Result<bool, Unsound> {
+        self.do_meet(|_| true)
+    }
+
+    /// Whether those that are asked for meet their deadlines; who does not run in real time is none of them.
+    ///
+    /// # Errors
+    /// As [`System::analyse`].
+    pub fn do_meet(&self, is_asked_for: impl Fn(usize) -> bool) -> Result<bool, Unsound> {
         let whole = Whole::of(self)?;
         let misses = |responses: &[Option<i128>]| {
             let mut all = responses.iter().zip(&whole.agents).enumerate();
             all.any(|(at, (response, agent))| {
-                self.is_in_real_time(at) && response.is_none_or(|response| response > agent.deadline)
+                is_asked_for(at)
+                    && self.is_in_real_time(at)
+                    && response.is_none_or(|response| response > agent.deadline)
             })
         };
-        // Responses only grow from round to round: who misses once misses.
-        let (_, responses) = whole.settle(misses);
+        // Responses only grow from round to round: who misses once misses. Not so where lateness makes a burst of messages that a gap keeps apart.
+        let grow = !whole.may_burst();
+        let (_, responses) = whole.settle(|responses| grow && misses(responses));
         Ok(!misses(&responses))
     }
 
@@ -174,13 +190,24 @@ impl System {
                 self.agents[*at].sources.iter().any(|source| source.agent() == Some(before))
             };
             if !runs_for_it {
-                let clocks = found[*at].streams.iter().filter(|stream| stream.after.is_none());
+                let clocks = self.agents[*at].sources.iter().filter_map(|source| match source {
+                    Source::Clock { period } => Some(*period),
+                    _ => None,
+                });
                 // It has just been released when the message comes.
-                sum += clocks.map(|stream| stream.period).min()?;
+                sum += clocks.min()?;
             }
             sum += found[*at].response?;
         }
         Some(sum)
+    }
+
+    /// Whether what one executor does keeps another one waiting.
+    pub(crate) fn goes_before(&self, one: usize, other: usize) -> bool {
+        let (a, b) = (&self.executors[one], &self.executors[other]);
+        one == other
+            || (a.priority > b.priority && a.may & b.may != 0)
+            || (a.priority == b.priority && a.may & b.may != 0)
     }
 
     /// Those that make others run before these.
@@ -218,7 +245,7 @@ impl System {
         let times = self.agents.iter().flat_map(|agent| {
             let sources = agent.sources.iter().map(|source| match source {
                 Source::Clock { period } | Source::Paced { period, .. } => *period,
-                Source::After { least, .. } => *least,
+                Source::After { least, .. } | Source::Asked { least } => *least,
             });
             [agent.cost, agent.deadline, agent.least_gap].into_iter().chain(sources)
         });
@@ -238,7 +265,9 @@ impl Numbers {
     fn of(agent: &Agent, ticks: i128) -> Numbers {
         let whole = |time: Exact| (time * Exact::from_integer(ticks)).to_integer();
         let source = |source: &Source| match source {
-            Source::Clock { period } | Source::Paced { period, .. } => whole(*period).max(1),
+            Source::Clock { period: between }
+            | Source::Paced { period: between, .. }
+            | Source::Asked { least: between } => whole(*between).max(1),
             Source::After { least, .. } => whole(*least),
         };
         Numbers {
@@ -299,6 +328,24 @@ impl Whole<'_> {
         (streams, responses)
     }
 
+    /// Whether it depends on how late others are if the gap between its steps is what bounds an agent.
+    fn may_burst(&self) -> bool {
+        let with_gap = |at: &usize| self.agents[*at].least_gap > 0;
+        if !(0..self.agents.len()).any(|at| with_gap(&at)) {
+            return false;
+        }
+        // Periods, unlike lateness, are the same in all rounds.
+        let streams = self.streams(&vec![Some(0); self.agents.len()]);
+        (0..self.agents.len()).filter(with_gap).any(|at| {
+            let by_others = streams[at].iter().filter(|flow| flow.after.is_some());
+            by_others.clone().next().is_some()
+                && by_others
+                    .map(|flow| self.agents[at].least_gap as f64 / flow.row.period as f64)
+                    .sum::<f64>()
+                    < 1.0
+        })
+    }
+
     /// What makes each agent run when the others take so long.
     fn streams(&self, responses: &[Option<i128>]) -> Streams {
         let mut streams: Streams = vec![Vec::new(); self.agents.len()];
@@ -312,7 +359,8 @@ impl Whole<'_> {
             let (mut by_clock, mut by_others) = (Vec::new(), Vec::new());
             for (source, number) in agent.sources.iter().zip(&numbers.sources) {
                 match source {
-                    Source::Clock { .. } => by_clock.push(flow(*number, 0, None, 0)),
+                    // Who asks for a step gets it at the time that it named; whoever goes before it does not make it ask sooner.
+                    Source::Clock { .. } | Source::Asked { .. } => by_clock.push(flow(*number, 0, None, 0)),
                     Source::Paced { agent, .. } => {
                         let late = responses[*agent].unwrap_or(2 * number).min(2 * number);
                         by_others.push(flow(*number, late, Some(*agent), 1));
@@ -329,7 +377,7 @@ impl Whole<'_> {
             let gap = numbers.least_gap;
             let rate: f64 = by_others.iter().map(|flow| gap as f64 / flow.row.period as f64).sum();
             let burst = by_others.iter().any(|flow| flow.row.jitter > gap);
-            if gap > 0 && (rate > 1.0 || burst) {
+            if gap > 0 && (rate >= 1.0 || burst) {
                 // Steps begin so far apart, whatever comes.
                 let after = by_others.first().and_then(|flow| flow.after);
                 by_others = vec![flow(gap, 0, after, 0)];
@@ -370,12 +418,15 @@ impl Whole<'_> {
         let numbers = &self.agents[at];
         let (mut beside, mut above) = (Vec::new(), Vec::new());
         for (other, agent) in self.system.agents.iter().enumerate() {
-            if !self.goes_before(agent.executor, own) || (other == at && streams[at].len() < 2) {
+            if !self.system.goes_before(agent.executor, own) || (other == at && streams[at].len() < 2) {
                 continue;
             }
-            let late = if other == at { Some(numbers.deadline) } else { before[other] }?;
-            let work =
-                streams[other].iter().map(|flow| Carried { row: flow.row, late: flow.row.jitter + late });
+            // Who has no bound himself leaves no more behind than one who passes releases over, or whose mailbox is full.
+            let late = |flow: &Flow| match other == at {
+                true => flow.row.jitter + numbers.deadline,
+                false => lateness(flow, before[other]),
+            };
+            let work = streams[other].iter().map(|flow| Carried { row: flow.row, late: late(flow) });
             if agent.executor == own { beside.extend(work) } else { above.extend(work) }
         }
         // One step at a time: the one before must be over when the next message comes.
@@ -403,7 +454,7 @@ impl Whole<'_> {
         let mut before: Vec<Row> = Vec::new();
         let mut longest_other = 0;
         for (other, agent) in self.system.agents.iter().enumerate() {
-            if other == at || !self.goes_before(agent.executor, own) {
+            if other == at || !self.system.goes_before(agent.executor, own) {
                 continue;
             }
             before.extend(streams[other].iter().map(|flow| flow.row));
@@ -421,14 +472,6 @@ impl Whole<'_> {
             worst = worst.zip(longest_wait(&own, &before, limit)).map(|(a, b)| a.max(b));
         }
         worst
-    }
-
-    /// Whether what one executor does keeps another one waiting.
-    fn goes_before(&self, one: usize, other: usize) -> bool {
-        let (a, b) = (&self.system.executors[one], &self.system.executors[other]);
-        one == other
-            || (a.priority > b.priority && a.may & b.may != 0)
-            || (a.priority == b.priority && a.may & b.may != 0)
     }
 
     fn told(&self, streams: &[Vec<Flow>], responses: &[Option<i128>]) -> Vec<Found> {

@@ -2,7 +2,7 @@
 
 use proptest::prelude::*;
 use schedule::processors::{ANYWHERE, Mask, Processors};
-use schedule::system::{Agent, Executor, Source, System, Unsound};
+use schedule::system::{Agent, Executor, Source, Stream, System, Unsound};
 use schedule::{Exact, response};
 
 use crate::{n, set, table_iii};
@@ -122,15 +122,48 @@ fn nothing_is_promised_to_ordinary_threads_and_they_keep_nobody_waiting() {
     assert!(system.is_feasible().unwrap());
 }
 
+#[test]
+fn a_step_that_is_asked_for_counts_as_one_of_a_clock_and_answers_nobody() {
+    // 1 of 4 by the clock above; below 2 of 10 by the clock, and the same again when it asks for it, beside 1 of its neighbour's asking.
+    let asked = Source::Asked { least: n(10) };
+    let both = [clock(10), vec![asked]].concat();
+    let agents = vec![agent(1, 4, 0, clock(4)), agent(2, 10, 1, both), agent(1, 20, 1, vec![asked])];
+    let system = System { processors: 1, agents, executors: executors(2) };
+    let found = system.analyse().unwrap();
+    let stream = Stream { period: n(10), jitter: n(0), after: None };
+    assert_eq!(found[1].streams, [stream, stream]);
+    // 2, a neighbour's step that has just begun, the other 2, the neighbour's next: 6, and 2 above make 8, when a third comes.
+    assert_eq!(found[1].response, Some(n(8)));
+    // 1, a step of 2 that has just begun, 2 and 2: 7, and 3 above make 10.
+    assert_eq!(found[2].response, Some(n(10)));
+    // Who runs only when it likes is not known to look at what another one has sent.
+    assert_eq!(system.latency(&found, &[0, 2]), None);
+    // Alone below the first: 2 + 1, and the next one of the first at 4 finds it done.
+    let alone = vec![agent(1, 4, 0, clock(4)), agent(2, 5, 1, vec![asked])];
+    let system = System { processors: 1, agents: alone, executors: executors(2) };
+    assert_eq!(responses(&system), [Some(n(1)), Some(n(3))]);
+}
+
+#[test]
+fn who_has_no_bound_takes_it_from_nobody_who_has_another_processor() {
+    // 9 of 10 on the first processor leave too little for 6 of 50 there. Below both 10 of 100 may run on the second one, too: of what goes before
+    // it, half counts. At 34 that is 27 + 4 of the first, and of the second what was left, what is new and what comes next, 3 * 6: 10 + 49 / 2.
+    let agents = vec![agent(9, 10, 0, clock(10)), agent(6, 50, 1, clock(50)), agent(10, 100, 2, clock(100))];
+    let threads =
+        [(65, 1), (50, 1), (40, 3)].map(|(priority, may)| Executor { priority: Some(priority), may });
+    let system = System { processors: 2, agents, executors: threads.into() };
+    assert_eq!(responses(&system), [Some(n(9)), None, Some(n(34))]);
+}
+
 #[derive(Clone, Debug)]
-struct Drawn {
-    system: System,
-    processors: usize,
-    chance: u64,
+pub(crate) struct Drawn {
+    pub system: System,
+    pub processors: usize,
+    pub chance: u64,
 }
 
 fn drawn() -> impl Strategy<Value = Drawn> {
-    let parts = (1i128..=12, 1usize..=4, 0usize..4, 0usize..6, 1u32..=3, any::<bool>());
+    let parts = (1i128..=12, 1usize..=4, 0usize..4, 0usize..6, 1u32..=3, 0u8..4);
     (
         proptest::collection::vec(parts, 1..=6),
         proptest::collection::vec((1u8..4, 1u64..4), 4),
@@ -138,17 +171,18 @@ fn drawn() -> impl Strategy<Value = Drawn> {
         any::<u64>(),
     )
         .prop_map(|(agents, executors, processors, chance)| {
-            let agents = agents.into_iter().enumerate().map(
-                |(at, (cost, period, executor, before, every, by_clock))| {
+            let agents =
+                agents.into_iter().enumerate().map(|(at, (cost, period, executor, before, every, how))| {
                     let period = period as i128 * 20;
-                    let sources = if at == 0 || by_clock {
-                        clock(period)
-                    } else {
-                        vec![Source::After { agent: before % at, every, least: n(0), depth: 8 }]
+                    let sources = match how {
+                        0 => vec![Source::Asked { least: n(period) }],
+                        1 | 2 if at > 0 => {
+                            vec![Source::After { agent: before % at, every, least: n(0), depth: 8 }]
+                        }
+                        _ => clock(period),
                     };
                     agent(cost, period, executor, sources)
-                },
-            );
+                });
             let executors = executors.into_iter().map(|(priority, may)| Executor {
                 priority: Some(priority),
                 may: if processors == 1 { 1 } else { may },
@@ -167,7 +201,7 @@ struct Pending {
 }
 
 /// Plays it for a while; the longest time of each agent from what made it run to the end of its step.
-fn longest(drawn: &Drawn) -> Vec<i128> {
+pub(crate) fn longest(drawn: &Drawn) -> Vec<i128> {
     let Drawn { system, processors, chance } = drawn;
     let mut state = chance | 1;
     let mut draw = |below: i128| {
@@ -179,10 +213,11 @@ fn longest(drawn: &Drawn) -> Vec<i128> {
     for executor in &system.executors {
         let _: usize = cpus.thread(executor.may as Mask);
     }
-    let period = |at: usize| match agents[at].sources[0] {
-        Source::Clock { period } => Some(period.to_integer()),
+    let period = |at: usize| match agents[at].sources.first() {
+        Some(Source::Clock { period } | Source::Asked { least: period }) => Some(period.to_integer()),
         _ => None,
     };
+    let is_asked = |at: usize| matches!(agents[at].sources.first(), Some(Source::Asked { .. }));
     let together = draw(2) == 0;
     let mut next: Vec<Option<i128>> = (0..agents.len())
         .map(|at| period(at).map(|period| if together { 0 } else { draw(period) }))
@@ -190,6 +225,7 @@ fn longest(drawn: &Drawn) -> Vec<i128> {
     let mut waiting: Vec<Vec<Pending>> = system.executors.iter().map(|_| Vec::new()).collect();
     let mut doing: Vec<Option<Pending>> = system.executors.iter().map(|_| None).collect();
     let mut sent = vec![0u32; agents.len()];
+    let mut soonest = vec![0; agents.len()];
     let mut longest = vec![0; agents.len()];
     while cpus.now() < 2000 {
         let now = cpus.now();
@@ -197,7 +233,9 @@ fn longest(drawn: &Drawn) -> Vec<i128> {
             if let (Some(due), Some(period)) = (next[at], period(at))
                 && due <= now
             {
-                next[at] = Some(due + period);
+                // Who asks for its steps cannot ask again before this one.
+                next[at] = (!is_asked(at)).then_some(due + period);
+                soonest[at] = due + period;
                 let lane = &mut waiting[agents[at].executor];
                 // One that was not done is passed over.
                 lane.retain(|pending| pending.agent != at);
@@ -223,8 +261,15 @@ fn longest(drawn: &Drawn) -> Vec<i128> {
             let Some(Pending { agent: at, since }) = doing[lane].take() else { continue };
             longest[at] = longest[at].max(now - since);
             sent[at] += 1;
+            if is_asked(at) {
+                let later = if draw(2) == 0 { draw(soonest[at] - since) } else { 0 };
+                next[at] = Some(soonest[at].max(now) + later);
+            }
             for (other, agent) in agents.iter().enumerate() {
-                let Source::After { agent: source, every, depth, .. } = agent.sources[0] else { continue };
+                let Some(Source::After { agent: source, every, depth, .. }) = agent.sources.first().copied()
+                else {
+                    continue;
+                };
                 let lane = &mut waiting[agent.executor];
                 let room = lane.iter().filter(|pending| pending.agent == other).count() < depth as usize;
                 if source == at && sent[at].is_multiple_of(every) && room {
@@ -252,6 +297,17 @@ proptest! {
     #[test]
     fn no_step_takes_longer_than_told(drawn in drawn()) {
         prop_assert_eq!(contradicted(&drawn, &responses(&drawn.system)), None);
+    }
+
+    #[test]
+    fn the_quick_verdict_is_that_of_the_analysis(drawn in drawn(), gaps in proptest::collection::vec(0i128..90, 6)) {
+        let mut system = drawn.system;
+        system.agents.iter_mut().zip(gaps).for_each(|(agent, gap)| agent.least_gap = n(gap));
+        let found = system.analyse().unwrap();
+        prop_assert_eq!(system.is_feasible().unwrap(), found.iter().all(|found| found.meets));
+        for at in 0..found.len() {
+            prop_assert_eq!(system.do_meet(|asked| asked == at).unwrap(), found[at].meets);
+        }
     }
 }
 
