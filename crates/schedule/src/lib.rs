@@ -13,6 +13,7 @@
 //! | which periods fit, within limits, by elasticity? | [`elastic`] |
 //! | what does it look like in time? | [`simulate`] |
 //! | what of agents that share threads, and trigger each other? | [`system`] |
+//! | who gives way when it is too much: periods, methods, budgets, lives? | [`manage`] |
 //! | how seldom may an encoder be read? | [`encoder`] |
 //!
 //! Times are exact fractions of a nanosecond ([`Exact`]), so that a set that is just feasible is found to be so.
@@ -22,6 +23,7 @@ pub mod demand;
 pub mod elastic;
 pub mod encoder;
 mod exact;
+pub mod manage;
 pub mod partition;
 pub mod processors;
 pub mod response;

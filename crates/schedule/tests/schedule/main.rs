@@ -2,6 +2,9 @@
 #![allow(clippy::unwrap_used)] // helpers of tests are tests
 
 mod bad;
+mod governing;
+mod managing;
+mod managing_cases;
 mod played;
 mod systems;
 mod tests_of_papers;
