@@ -88,8 +88,9 @@ impl TrackerParams {
     }
 }
 
-/// Finds the largest region of a colour, turns the head to it, comes close and stops before it.
+/// Finds the largest region of a colour, turns the head to it, comes close and stops before it. Its method "rough" looks at every other pixel of every other line.
 #[derive(Agent)]
+#[agent(methods(exact = 1.0, rough = 0.5))]
 pub struct ImageTracker {
     /// Pictures as hue, saturation and intensity, where somebody makes them anyway.
     hsi: Input<Image>,
@@ -118,7 +119,7 @@ impl Agent for ImageTracker {
         Ok(())
     }
 
-    fn step(&mut self, _: &mut Step) -> Result<(), Fault> {
+    fn step(&mut self, step: &mut Step) -> Result<(), Fault> {
         if let Some(head) = self.head.latest() {
             self.hunt.head = head;
         }
@@ -126,7 +127,7 @@ impl Agent for ImageTracker {
         let stamp = picture.header().stamp;
         // Where the head looked when the picture was taken, not where it looks by now.
         let head = self.head.at(stamp).map_or(self.hunt.head, |found| found.value());
-        let seen = self.eye.see(&self.params, &picture, picture.row())?;
+        let seen = self.eye.see(&self.params, &picture, picture.row(), step.method == ROUGH)?;
         let found = self.hunt.pursue(&self.params, seen, head, stamp);
         self.target.send(found.target);
         self.look.send(found.look);
@@ -137,21 +138,51 @@ impl Agent for ImageTracker {
     }
 }
 
+/// The place of the method that looks at a quarter of the pixels. It tells directions half as exactly, which is its quality.
+const ROUGH: usize = 1;
+/// It takes one pixel of so many, in both directions.
+const THINNED: usize = 2;
+
 /// What finds the target in a picture; made for one size of pictures.
 #[derive(Default)]
 struct Eye {
     /// What tells the hue of a pixel; only RGB pictures need it.
     colours: Option<Converter>,
+    fine: View,
+    rough: View,
+    /// The pixels that the rough look takes.
+    thinned: Vec<u8>,
+}
+
+/// What looks at pictures of one size.
+#[derive(Default)]
+struct View {
     mask: Vec<u8>,
     finder: Option<BlobFinder<8>>,
+}
+
+impl View {
+    fn fit(&mut self, size: Size) {
+        if self.finder.as_ref().is_none_or(|finder| finder.size() != size) {
+            self.finder = Some(BlobFinder::new(size, BlobParams::default()));
+            self.mask = vec![0; size.pixels()];
+        }
+    }
+}
+
+/// The size of a picture of which a part is taken.
+fn thinned(size: Size) -> Size {
+    Size::new(size.width.div_ceil(THINNED), size.height.div_ceil(THINNED))
 }
 
 impl Eye {
     /// Makes room for pictures of this size; nothing when there is already.
     fn fit(&mut self, size: Size) {
-        if self.finder.as_ref().is_none_or(|finder| finder.size() != size) {
-            self.finder = Some(BlobFinder::new(size, BlobParams::default()));
-            self.mask = vec![0; size.pixels()];
+        self.fine.fit(size);
+        self.rough.fit(thinned(size));
+        let bytes = 3 * thinned(size).pixels();
+        if self.thinned.len() != bytes {
+            self.thinned = vec![0; bytes];
         }
     }
 
@@ -165,29 +196,45 @@ impl Eye {
         params: &TrackerParams,
         picture: &Image,
         row: &[u8],
+        is_rough: bool,
     ) -> Result<Option<Sighting>, Fault> {
         const WRONG: Fault = Fault::new(
             "the tracker needs whole pictures: RGB at \"rgb\", or those of the output \"hsi\" of a camera",
         );
-        if row.len() != picture.len() || row.is_empty() {
+        let size = Size::new(picture.width as usize, picture.height as usize);
+        if row.len() != picture.len() || row.is_empty() || row.len() != 3 * size.pixels() {
             return Err(WRONG);
         }
-        let size = Size::new(picture.width as usize, picture.height as usize);
         self.fit(size);
+        let (view, row, size) = if is_rough {
+            thin(row, size.width, &mut self.thinned);
+            (&mut self.rough, &self.thinned[..], thinned(size))
+        } else {
+            (&mut self.fine, row, size)
+        };
         let range = params.colours();
         match picture.encoding {
-            Encoding::Hsi8 => in_range(row, &range, &mut self.mask),
-            Encoding::Rgb8 => self.colours.get_or_insert_default().split(row, &range, &mut self.mask),
+            Encoding::Hsi8 => in_range(row, &range, &mut view.mask),
+            Encoding::Rgb8 => self.colours.get_or_insert_default().split(row, &range, &mut view.mask),
             _ => return Err(WRONG),
         }
         .map_err(|_| WRONG)?;
-        let Some(finder) = &mut self.finder else { return Ok(None) };
-        let Some(blob) = finder.largest(&self.mask).map_err(|_| WRONG)? else { return Ok(None) };
+        let Some(finder) = &mut view.finder else { return Ok(None) };
+        let Some(blob) = finder.largest(&view.mask).map_err(|_| WRONG)? else { return Ok(None) };
         let camera = Camera { size, horizontal_field_of_view: picture.field_of_view.into() };
         let found = target(&blob, &camera);
         let sighting =
             Sighting { bearing: found.bearing, elevation: found.elevation, share: found.area_share };
         Ok((found.area_share >= params.share_min).then_some(sighting))
+    }
+}
+
+/// Takes one pixel of so many in both directions.
+fn thin(row: &[u8], width: usize, into: &mut [u8]) {
+    let lines = row.chunks_exact(3 * width).step_by(THINNED);
+    let pixels = lines.flat_map(|line| line.as_chunks::<3>().0.iter().step_by(THINNED));
+    for (pixel, out) in pixels.zip(into.as_chunks_mut::<3>().0) {
+        *out = *pixel;
     }
 }
 
@@ -272,7 +319,7 @@ mod tests {
         let mut eye = Eye::default();
         let mut see = |columns| {
             let (image, row) = picture(columns);
-            eye.see(&params, &image, &row).unwrap()
+            eye.see(&params, &image, &row, false).unwrap()
         };
         let left = see(0..4).unwrap();
         assert!(left.bearing > 0.4 && left.elevation.abs() < 1e-9, "{left:?}");
@@ -280,7 +327,7 @@ mod tests {
         assert!(see(14..18).unwrap().bearing.abs() < 1e-9);
         assert_eq!(see(0..0), None);
         let (image, row) = picture(0..4);
-        assert!(eye.see(&params, &Image { encoding: Encoding::Mono8, ..image }, &row[..768]).is_err());
+        assert!(eye.see(&params, &Image { encoding: Encoding::Mono8, ..image }, &row[..768], false).is_err());
     }
 
     #[test]
@@ -292,10 +339,26 @@ mod tests {
         let mut hsi = vec![0; rgb.len()];
         Converter::new().convert(&rgb, &mut hsi).unwrap();
         let mut eye = Eye::default();
-        let seen = eye.see(&params, &image, &rgb).unwrap().unwrap();
+        let seen = eye.see(&params, &image, &rgb, false).unwrap().unwrap();
         assert!((seen.share - 6.0 / 32.0).abs() < 1e-12, "{seen:?}");
-        let converted = eye.see(&params, &Image { encoding: Encoding::Hsi8, ..image }, &hsi).unwrap();
+        let converted = eye.see(&params, &Image { encoding: Encoding::Hsi8, ..image }, &hsi, false).unwrap();
         assert_eq!(converted, Some(seen));
+    }
+
+    #[test]
+    fn a_rough_look_finds_the_same_to_two_pixels() {
+        let params = TrackerParams::default();
+        let mut eye = Eye::default();
+        let pixel = 1.0 / 32.0;
+        for left in 0..28 {
+            let (image, row) = picture(left..left + 4);
+            let exact = eye.see(&params, &image, &row, false).unwrap().unwrap();
+            let rough = eye.see(&params, &image, &row, true).unwrap().unwrap();
+            assert!((exact.bearing - rough.bearing).abs() < 2.2 * pixel, "{left}: {exact:?} {rough:?}");
+            assert!((exact.share - rough.share).abs() < 0.02, "{left}: {exact:?} {rough:?}");
+        }
+        let (image, row) = picture(0..0);
+        assert_eq!(eye.see(&params, &image, &row, true).unwrap(), None);
     }
 
     fn at(millis: i64) -> Time {

@@ -14,6 +14,7 @@
 //! | [`image_tracker`] | HSI picture, head | the target, wishes for feet and head |
 //! | [`coordinator`] | wishes, safety, decision | one command for the drive |
 //! | [`decision_maker`] | safety, target, risk, battery, odometry, load, signals | situations, goal, everybody's weight and orders, reasons |
+//! | [`resource_manager`] | the load of the computer, orders | periods, methods, budgets and rest for all |
 //! | [`drive`] | a command, orders of people, a reflex | what the wheels can do of it |
 //! | [`head`] | wishes, orders of people | what the head can do of it |
 //!
@@ -28,6 +29,7 @@ pub mod head;
 pub mod image_tracker;
 pub mod laser;
 pub mod odometry;
+pub mod resource_manager;
 pub mod safety_monitor;
 mod shared;
 pub mod sonar;
@@ -42,6 +44,7 @@ pub use head::PanTilt;
 pub use image_tracker::ImageTracker;
 pub use laser::Laser;
 pub use odometry::DeadReckoning;
+pub use resource_manager::ResourceManager;
 pub use safety_monitor::SafetyMonitor;
 pub use sonar::Sonar;
 pub use wall_follower::WallFollower;
@@ -60,6 +63,7 @@ pub fn registry() -> runtime::Registry {
         Coordinator,
         DriveBase,
         DecisionMaker,
+        ResourceManager,
     ]
 }
 
@@ -83,6 +87,7 @@ mod tests {
             "coordinator",
             "drive",
             "decision-maker",
+            "resource-manager",
         ];
         assert_eq!(kinds, expected);
         for known in registry.types() {

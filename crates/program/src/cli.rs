@@ -103,6 +103,9 @@ pub(crate) struct RunArgs {
     /// Where the log goes; else DIR/run.mcap.
     #[arg(long, value_name = "F.mcap", conflicts_with = "no_log")]
     pub(crate) log: Option<PathBuf>,
+    /// Runs once, where the file has several runs to be compared.
+    #[arg(long)]
+    pub(crate) alone: bool,
     /// Writes no log, and so draws no figures.
     #[arg(long)]
     pub(crate) no_log: bool,

@@ -53,6 +53,38 @@ pub(crate) fn of_log(log: &Path, folder: &Path, timing: Option<Timing>) -> Resul
     Ok(files.made)
 }
 
+/// How often agents sent something, what they missed, and when they were suspended.
+#[derive(Debug, Default)]
+pub(crate) struct Rates {
+    /// When each agent sent something (s).
+    pub(crate) sent: BTreeMap<String, Vec<f64>>,
+    /// When each missed a deadline (s).
+    pub(crate) misses: BTreeMap<String, Vec<f64>>,
+    /// From when on each was suspended, or was not any more.
+    rest: BTreeMap<String, Vec<(f64, bool)>>,
+}
+
+impl Rates {
+    /// From when to when an agent was suspended, in a run that ended at `end` (s).
+    pub(crate) fn suspended_of(&self, agent: &str, end: f64) -> Vec<(f64, f64)> {
+        let Some(rest) = self.rest.get(agent) else { return Vec::new() };
+        let ends = rest.iter().skip(1).map(|(time, _)| *time).chain([end]);
+        let spans = rest.iter().zip(ends).filter(|((_, is), _)| *is);
+        spans.map(|((from, _), to)| (*from, to)).collect()
+    }
+}
+
+/// What a log tells of how often agents ran.
+pub(crate) fn rates(log: &Path) -> Result<Rates, String> {
+    let mut reader = Reader::open(log).map_err(|error| error.to_string())?;
+    let mut trail = Trail::new(&reader.run().cloned().unwrap_or_default());
+    while let Some(message) = reader.next_message().map_err(|error| error.to_string())? {
+        trail.take(&message);
+    }
+    let Trail { sent, misses, rest, .. } = trail;
+    Ok(Rates { sent, misses, rest })
+}
+
 /// The names of the robots of a log.
 pub(crate) fn robots(notes: &Notes) -> Vec<String> {
     scenery::robots(notes).into_iter().map(|robot| robot.name).collect()

@@ -30,6 +30,7 @@ pub fn schema(registry: &Registry) -> Json {
         goal_,
         vary_,
         burden_,
+        compare_,
         at_,
     ] = SECTIONS;
     let properties = object([
@@ -53,6 +54,12 @@ pub fn schema(registry: &Registry) -> Json {
             json!({"type": "object", "description": "What a seed draws: an entry and its distribution."}),
         ),
         (burden_, named(burden(), "Work of other processes with a real-time priority.")),
+        (
+            compare_,
+            json!({"type": "object", "minProperties": 1, "maxProperties": 1,
+                "additionalProperties": {"type": "array", "minItems": 2},
+                "description": "An entry of the plan with several values, whose runs are shown one above the other."}),
+        ),
         (at_, json!({"type": "array", "items": request(), "description": "Timed requests and faults."})),
     ]);
     json!({

@@ -24,6 +24,8 @@ pub struct Census {
     pub residents: Vec<Resident>,
     /// What the runtime needs around a step: it is in the costs of `system`.
     pub overhead: Duration,
+    /// By how many percent of what was measured the next step is to be counted.
+    pub percent: i64,
     /// Why what was set last was refused.
     pub refused: Option<Refusal>,
 }
@@ -41,6 +43,8 @@ pub struct Resident {
     pub method: usize,
     /// Whether it refines its results while it may.
     pub is_anytime: bool,
+    /// The time between two messages that make it run, at the rates that were asked for; nothing where it runs by its period, or for none.
+    pub gap: Option<Duration>,
     /// Whether its executor has a real-time priority.
     pub is_real_time: bool,
     /// Whether it is a robot's gate.

@@ -6,7 +6,7 @@ use record::figure::{Band, Drawing, Event};
 use record::log::{Message, RunInfo};
 use types::cdr::Reader;
 use types::message::Message as Typed;
-use types::messages::{Decision, Echoes, LaserScan, Odometry, Transforms, Twist};
+use types::messages::{Decision, Echoes, Grant, LaserScan, Odometry, Transforms, Twist};
 use types::{Point, Pose, Time};
 
 use super::scenery::{self, KnownRobot};
@@ -46,6 +46,10 @@ pub(super) struct Trail {
     pub(super) events: Vec<Event>,
     /// When each agent sent something.
     pub(super) sent: BTreeMap<String, Vec<f64>>,
+    /// When each agent missed a deadline.
+    pub(super) misses: BTreeMap<String, Vec<f64>>,
+    /// From when on each agent was suspended, or was not any more.
+    pub(super) rest: BTreeMap<String, Vec<(f64, bool)>>,
     /// The first and the last time.
     pub(super) span: Option<(f64, f64)>,
     known: Vec<KnownRobot>,
@@ -148,6 +152,12 @@ impl Trail {
             LaserScan::NAME if self.is_robot(agent) && port == "scan" => self.scan(agent, message),
             Odometry::NAME => self.odometry(time, agent, port, message),
             Twist::NAME => self.command(time, &topic, message),
+            Grant::NAME => {
+                if let Some((grant, _)) = decode::<Grant>(message) {
+                    let name = grant.agent.as_str().to_owned();
+                    self.rest.entry(name).or_default().push((time, grant.suspended));
+                }
+            }
             _ => {}
         }
     }
@@ -261,6 +271,9 @@ impl Trail {
         let Some(table) = value.as_table() else { return };
         let text = |key: &str| table.get(key).and_then(|entry| entry.value.as_text()).unwrap_or_default();
         let (who, what) = (text("name"), text("msg"));
+        if what.starts_with("missed its deadline") {
+            self.misses.entry(who.to_owned()).or_default().push(time);
+        }
         let tells = ["panic: ", "did not return", "started again", "latch is set", "latch is reset"];
         if self.events.len() < MOST_EVENTS && who != "plan" && tells.iter().any(|word| what.contains(word)) {
             let what = what.split(" (").next().unwrap_or(what);

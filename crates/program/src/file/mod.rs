@@ -17,6 +17,7 @@
 
 mod agent;
 mod burden;
+mod compare;
 mod decide;
 mod group;
 pub(crate) mod knowledge;
@@ -31,6 +32,7 @@ mod wires;
 mod write;
 
 pub(crate) use burden::{burdens, processors};
+pub(crate) use compare::compared;
 pub(crate) use decide::read_alone;
 pub use library::{Found, Shelf};
 pub(crate) use read::SECTIONS;

@@ -16,10 +16,10 @@ use super::group::Names;
 use super::library::Shelf;
 use super::sources::{Mistakes, Sources};
 use super::wires::Written;
-use super::{burden, decide, knowledge, set, tree};
+use super::{burden, compare, decide, knowledge, set, tree};
 
 /// The sections of a system file.
-pub(crate) const SECTIONS: [&str; 14] = [
+pub(crate) const SECTIONS: [&str; 15] = [
     "name",
     "world",
     "processors",
@@ -33,6 +33,7 @@ pub(crate) const SECTIONS: [&str; 14] = [
     "goal",
     "vary",
     "burden",
+    "compare",
     "at",
 ];
 /// Longer than anything that robots do. Several such times can be added and each taken four times without an overflow.
@@ -206,6 +207,7 @@ impl<'r> Reader<'r> {
         self.requests(tree);
         decide::read(self, tree);
         burden::read(self, tree);
+        compare::read(self, tree);
         knowledge::read(self, tree);
         self.read_world(tree);
         let judged = runtime::check(&self.plan, self.registry);

@@ -8,6 +8,7 @@
 
 mod asked;
 mod burden;
+mod compare;
 mod judge;
 mod knowing;
 mod options;
@@ -18,6 +19,7 @@ mod seeds;
 mod serve;
 mod summary;
 mod timing;
+mod useful;
 
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
@@ -87,7 +89,10 @@ pub(crate) fn run(args: &RunArgs, registry: Registry, json: bool) -> Result<Exit
     let place = Place::of(args, name, seed)?;
     let (scenario, serves) = (&scenario, true);
     let whole = One { args, scenario, seed, clock, watched, place, asked_to_end, serves, repeat, knowing };
-    let summary = whole.run(ready)?;
+    let mut summary = whole.run(ready)?;
+    if let Some(compared) = compare::asked(args, &whole.scenario.file.plan) {
+        summary.compared = compare::run(&whole, &summary, &compared)?;
+    }
     if json {
         terminal::say_json(&summary.to_json());
     } else {
@@ -192,6 +197,7 @@ impl One<'_> {
         };
         let report = self.play(&ready, &plan, &asked, options)?;
         let mut summary = Summary::new(&ready, self.seed, clock_name(self.clock), report);
+        summary.done = useful::done(&ready, &summary.agents, summary.time);
         summary.images = self.args.images;
         summary.log = outcome.map(|outcome| outcome.lock().unwrap_or_else(PoisonError::into_inner).clone());
         summary.repeats(&asked);

@@ -12,6 +12,7 @@ use super::judge;
 use super::knowing;
 use super::prepare::Ready;
 use super::recorder::LogOutcome;
+use super::useful::{Done, useful};
 use crate::terminal::paint;
 
 /// What became of a robot.
@@ -77,6 +78,10 @@ pub(crate) struct Summary {
     pub(crate) images: f64,
     pub(crate) files: Vec<PathBuf>,
     pub(crate) repeat: Option<Repeated>,
+    /// What the agents did whose plan says how important they are.
+    pub(crate) done: Vec<Done>,
+    /// Lines on the runs that this one is compared with.
+    pub(crate) compared: Vec<String>,
 }
 
 impl Summary {
@@ -137,6 +142,8 @@ impl Summary {
             images: 0.0,
             files: Vec::new(),
             repeat: None,
+            done: Vec::new(),
+            compared: Vec::new(),
         }
     }
 
@@ -252,6 +259,13 @@ impl Summary {
                 "missed": self.count(|agent| agent.counts.missed),
                 "stalled": self.count(|agent| agent.counts.stalled),
             },
+            "useful": useful(&self.done).map(|share| json!({
+                "share": share,
+                "agents": self.done.iter().map(|done| json!({
+                    "name": done.name, "share": done.share(), "importance": done.work.importance,
+                    "nominal": done.work.nominal, "in_time": done.work.in_time, "quality": done.work.quality,
+                })).collect::<Vec<_>>(),
+            })),
             "messages": {"sent": self.sent, "dropped": self.dropped, "refused": self.refused},
             "allocations": self.allocations.as_ref().map(|by| json!({
                 "real_time": by.iter().map(|(_, count)| count).sum::<u64>(),
@@ -307,6 +321,11 @@ impl Summary {
             line(format!("               {}", self.wishes()));
         }
         line(format!("  deadlines    {}", self.deadlines()));
+        if let Some(useful) = useful(&self.done) {
+            let each = self.done.iter().map(|done| format!("{} {:.0} %", done.name, done.share() * 100.0));
+            let each: Vec<String> = each.collect();
+            line(format!("  useful work  {:.1} %: {}", useful * 100.0, each.join(", ")));
+        }
         line(format!("  messages     {}", self.messages()));
         if let Some(text) = self.memory() {
             line(format!("  memory       {text}"));
@@ -338,6 +357,7 @@ impl Summary {
                 }
             });
         }
+        self.compared.iter().for_each(|text| line(text.clone()));
         for (i, file) in self.files.iter().enumerate() {
             line(format!("  {:<12} {}", if i == 0 { "files" } else { "" }, file.display()));
         }
@@ -661,17 +681,18 @@ pub(crate) fn agent_table(agents: &[AgentView]) -> String {
 }
 
 /// Rows in columns; the first `left` columns are words, the others numbers.
-pub(crate) fn table<const N: usize>(rows: &[[String; N]], left: usize) -> String {
-    let mut widths = [0; N];
-    for row in rows {
+pub(crate) fn table<R: AsRef<[String]>>(rows: &[R], left: usize) -> String {
+    let mut widths = Vec::new();
+    for row in rows.iter().map(AsRef::as_ref) {
+        widths.resize(row.len().max(widths.len()), 0);
         for (width, cell) in widths.iter_mut().zip(row) {
             *width = (*width).max(cell.chars().count());
         }
     }
     let mut out = String::new();
-    for row in rows {
+    for row in rows.iter().map(AsRef::as_ref) {
         let mut line = String::from("  ");
-        for (i, (cell, width)) in row.iter().zip(widths).enumerate() {
+        for (i, (cell, width)) in row.iter().zip(widths.iter().copied()).enumerate() {
             line += &if i < left { format!("{cell:<width$}  ") } else { format!("{cell:>width$}  ") };
         }
         out += line.trim_end();

@@ -143,8 +143,14 @@ impl Router {
         let pace = |port: &str| pace.get(port).copied();
         let assumed = Assumed { cost: &cost, processors, overhead, pace: &pace };
         let table = timetable(&plan, registry, &assumed);
+        let found = table.system.analyse().unwrap_or_default();
+        let gap = |at: usize, plan: &AgentPlan| {
+            let streams = found.get(at).map(|found| &found.streams[..]).unwrap_or_default();
+            let period = streams.iter().map(|stream| stream.period).min()?;
+            plan.period.is_none().then(|| Duration(period.to_integer() as i64))
+        };
         let order: Vec<AgentId> = self.in_order().iter().map(|known| known.id).collect();
-        let residents = plan.agents.iter().zip(order).filter_map(|(nominal, id)| {
+        let residents = plan.agents.iter().zip(order).enumerate().filter_map(|(at, (nominal, id))| {
             let known = self.agents.get_mut(&id)?;
             let recent = known.window.look(&known.stats, now, SPAN);
             let view = self.view_agent(&self.agents[&id]);
@@ -155,6 +161,7 @@ impl Router {
                 methods: known.kind.methods,
                 method: usize::from(known.timing.means.method),
                 is_anytime: known.kind.is_anytime,
+                gap: gap(at, nominal),
                 is_real_time: self.executors[known.executor].plan.level().is_some(),
                 is_robot: self.robots.contains(&known.plan.name),
                 state: known.state,
@@ -166,6 +173,8 @@ impl Router {
         let residents = residents.collect();
         let place = self.managing.refused.iter().position(|(known, _)| *known == id);
         let refused = place.map(|place| self.managing.refused.remove(place).1);
-        Census { now, system: table.system, executors: table.executors, residents, overhead, refused }
+        let percent = self.measures.unwrap_or(super::AS_PLAYED);
+        let executors = table.executors;
+        Census { now, system: table.system, executors, residents, overhead, percent, refused }
     }
 }

@@ -14,6 +14,7 @@ mod deaths;
 mod filters;
 mod fire;
 mod gaps;
+mod means;
 mod memory;
 mod queues;
 mod requests;

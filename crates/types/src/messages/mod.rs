@@ -3,6 +3,7 @@
 mod body;
 mod command;
 mod decision;
+mod grant;
 mod image;
 mod load;
 mod orders;
@@ -15,6 +16,7 @@ mod sighting;
 pub use body::{Battery, Bumper, Gyro, Head, WheelTicks};
 pub use command::{Amount, Direction, Drive, Offer, Twist, Verb, Word};
 pub use decision::{Decision, MOST_AGENTS, Row, Safety, Target};
+pub use grant::Grant;
 pub use image::{Encoding, Image};
 pub use load::Load;
 pub use orders::{Activity, Order, Orders};

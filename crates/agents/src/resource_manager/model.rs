@@ -1,0 +1,162 @@
+//! From what there is to what the analysis sees of it, and what may be taken from whom.
+
+use runtime::{Census, HostReading, Resident};
+use schedule::Exact;
+use schedule::manage::{Anytime, Managed, Orders as Wanted, Way};
+use schedule::system::{Agent, Executor, Source, System};
+use types::messages::{Order, Orders};
+use types::{Duration, Time};
+
+use super::ResourceParams;
+
+/// After so many steps of late what was measured counts.
+const MEASURED_AFTER: u64 = 5;
+/// Where executors by deadline stand among the others, and so processes by deadline too.
+const ABOVE_ALL: u8 = 100;
+
+/// What is remembered of each agent.
+#[derive(Debug, Default)]
+pub(super) struct Model {
+    /// By how much steps take longer than is declared, and when that was seen last.
+    seen: Vec<(f64, Option<Time>)>,
+}
+
+impl Model {
+    /// All agents with what they take now by their methods at best, and with the work of others.
+    pub(super) fn system(
+        &mut self,
+        census: &Census,
+        host: &HostReading,
+        params: &ResourceParams,
+        now: Time,
+    ) -> System {
+        let mut system = census.system.clone();
+        self.seen.resize(census.residents.len(), (1.0, None));
+        let residents = census.residents.iter().zip(&mut self.seen);
+        for (agent, (resident, seen)) in system.agents.iter_mut().zip(residents) {
+            look(resident, seen, census.percent, now, params.believes);
+            agent.cost = exact(cost_of(resident, 0, seen.0) + census.overhead);
+        }
+        for burden in &host.burdens {
+            let priority = Some(if burden.priority == 0 { ABOVE_ALL } else { burden.priority });
+            system.executors.push(Executor { priority, may: burden.may });
+            let period = params.burden_period;
+            let work = Duration((period.0 as f64 * f64::from(burden.share)) as i64 / 1000 * 1000);
+            system.agents.push(Agent {
+                cost: exact(work),
+                deadline: exact(period),
+                executor: system.executors.len() - 1,
+                sources: vec![Source::Clock { period: exact(period) }],
+                least_gap: exact(Duration::ZERO),
+            });
+        }
+        system
+    }
+
+    /// What may be taken from each.
+    pub(super) fn managed(
+        &self,
+        census: &Census,
+        system: &System,
+        orders: &Orders,
+        own: &str,
+    ) -> Vec<Managed> {
+        let residents = census.residents.iter().enumerate();
+        residents
+            .map(|(at, resident)| {
+                let name = resident.plan.name.as_str();
+                let order = orders.orders.iter().find(|order| order.agent.as_str() == name);
+                if resident.is_robot || name == own || resident.nominal.giving.is_rigid {
+                    return Managed::rigid();
+                }
+                managed(resident, order, self.seen[at].0, census.overhead, system.agents[at].cost)
+            })
+            .collect()
+    }
+}
+
+/// What steps took of late beside what is declared for them. Where there were none, what was seen last is believed for some time.
+fn look(resident: &Resident, seen: &mut (f64, Option<Time>), percent: i64, now: Time, believes: Duration) {
+    let (steps, longest) = resident.recent;
+    let declared = resident.plan.cost_of_step(resident.methods).unwrap_or(Duration::ZERO);
+    if steps >= MEASURED_AFTER && declared > Duration::ZERO {
+        // What an anytime agent took for refinements it took within its budget.
+        let free = resident.plan.budget.unwrap_or(Duration::ZERO);
+        let over = if free > Duration::ZERO { longest - free + declared } else { longest };
+        let taken = Duration(over.0 * percent / 100);
+        *seen = ((taken.0 as f64 / declared.0 as f64).max(1.0), Some(now));
+    } else if seen.1.is_none_or(|at| now - at > believes) {
+        *seen = (1.0, None);
+    }
+}
+
+/// What a step takes by a method, with its whole budget.
+fn cost_of(resident: &Resident, method: usize, times: f64) -> Duration {
+    let base = base_of(resident, method, times);
+    base.max(resident.nominal.budget.unwrap_or(Duration::ZERO))
+}
+
+/// What it takes without refinements.
+fn base_of(resident: &Resident, method: usize, times: f64) -> Duration {
+    let declared = match resident.methods.get(method) {
+        Some(method) => resident.nominal.cost_by(method.name),
+        None => resident.nominal.cost,
+    };
+    // Whole microseconds: the analysis is exact, and finer ones would cost it much.
+    let micros = declared.unwrap_or(Duration::ZERO).0 as f64 * times / 1000.0;
+    Duration((micros - 1e-6).ceil() as i64 * 1000)
+}
+
+/// The gap between two steps of an agent that only messages make run, at the rate at which they come; nothing where it has none to lengthen.
+pub(super) fn nominal_gap(resident: &Resident) -> Option<Duration> {
+    resident.nominal.giving.gap_max.and(resident.gap)
+}
+
+fn managed(
+    resident: &Resident,
+    order: Option<&Order>,
+    times: f64,
+    overhead: Duration,
+    cost: Exact,
+) -> Managed {
+    let plan = &resident.nominal;
+    let (nominal, longest) = match plan.period {
+        Some(period) => (Some(period), plan.period_range.map(|(_, longest)| longest)),
+        None => (nominal_gap(resident), plan.giving.gap_max),
+    };
+    let way = |method: usize, quality: f64| Way {
+        cost: exact(cost_of(resident, method, times) + overhead),
+        quality,
+    };
+    let methods = resident.methods.iter().enumerate().map(|(at, method)| way(at, method.quality));
+    let asked = plan.method.as_deref().and_then(|name| place_of(resident, name)).unwrap_or(0);
+    let wanted = order.and_then(Order::method).and_then(|name| place_of(resident, name));
+    let anytime = plan.budget.map(|budget| {
+        let least = base_of(resident, asked, times);
+        Anytime { least: exact(least + overhead), most: exact(least.max(budget) + overhead) }
+    });
+    let _ = cost;
+    Managed {
+        rigid: false,
+        nominal: nominal.map(exact),
+        longest: longest.zip(nominal).map(|(longest, nominal)| exact(longest.max(nominal))),
+        elasticity: if longest.is_some() { plan.giving.elasticity() } else { 0.0 },
+        importance: order.and_then(Order::importance).unwrap_or(plan.giving.importance()),
+        methods: methods.collect(),
+        anytime,
+        may_suspend: plan.giving.may_suspend,
+        orders: Wanted {
+            rate: order.and_then(Order::rate).unwrap_or(1.0),
+            active: order.and_then(Order::active).unwrap_or(!plan.giving.is_suspended),
+            method: wanted.unwrap_or(asked),
+        },
+    }
+}
+
+fn place_of(resident: &Resident, method: &str) -> Option<usize> {
+    resident.methods.iter().position(|known| known.name == method)
+}
+
+fn exact(span: Duration) -> Exact {
+    Exact::from_integer(span.0.into())
+}
