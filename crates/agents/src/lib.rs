@@ -9,9 +9,12 @@
 //! | [`laser`] | a scan | ranges around the robot, risk in each direction |
 //! | [`camera`] | a picture | RGB, HSI, edges, motion |
 //! | [`odometry`] | wheel counts | where the robot believes to be |
+//! | [`lookout`] | ranges, sightings | the nearer of what is heard and who is seen |
 //! | [`safety_monitor`] | ranges | how fast is safe, and a way out |
 //! | [`wall_follower`] | ranges, odometry | a wish to drive along the wall |
 //! | [`image_tracker`] | HSI picture, head | the target, wishes for feet and head |
+//! | [`recogniser`] | a picture, head | whether a thing of a colour and shape is there, and where |
+//! | [`path_planner`] | ranges, odometry | a way to a place, and how good it is |
 //! | [`coordinator`] | wishes, safety, decision | one command for the drive |
 //! | [`decision_maker`] | safety, target, risk, battery, odometry, load, signals | situations, goal, everybody's weight and orders, reasons |
 //! | [`drive`] | a command, orders of people, a reflex | what the wheels can do of it |
@@ -27,7 +30,10 @@ pub mod drive;
 pub mod head;
 pub mod image_tracker;
 pub mod laser;
+pub mod lookout;
 pub mod odometry;
+pub mod path_planner;
+pub mod recogniser;
 pub mod safety_monitor;
 mod shared;
 pub mod sonar;
@@ -41,7 +47,10 @@ pub use drive::DriveBase;
 pub use head::PanTilt;
 pub use image_tracker::ImageTracker;
 pub use laser::Laser;
+pub use lookout::Lookout;
 pub use odometry::DeadReckoning;
+pub use path_planner::PathPlanner;
+pub use recogniser::Recogniser;
 pub use safety_monitor::SafetyMonitor;
 pub use sonar::Sonar;
 pub use wall_follower::WallFollower;
@@ -53,9 +62,12 @@ pub fn registry() -> runtime::Registry {
         Laser,
         Camera,
         DeadReckoning,
+        Lookout,
         SafetyMonitor,
         WallFollower,
         ImageTracker,
+        Recogniser,
+        PathPlanner,
         PanTilt,
         Coordinator,
         DriveBase,
@@ -76,9 +88,12 @@ mod tests {
             "laser",
             "camera",
             "odometry",
+            "lookout",
             "safety-monitor",
             "wall-follower",
             "image-tracker",
+            "recogniser",
+            "path-planner",
             "head",
             "coordinator",
             "drive",
