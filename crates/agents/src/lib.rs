@@ -9,9 +9,12 @@
 //! | [`laser`] | a scan | ranges around the robot, risk in each direction |
 //! | [`camera`] | a picture | RGB, HSI, edges, motion |
 //! | [`odometry`] | wheel counts | where the robot believes to be |
+//! | [`lookout`] | ranges, sightings | the nearer of what is heard and who is seen |
 //! | [`safety_monitor`] | ranges | how fast is safe, and a way out |
 //! | [`wall_follower`] | ranges, odometry | a wish to drive along the wall |
 //! | [`image_tracker`] | HSI picture, head | the target, wishes for feet and head |
+//! | [`recogniser`] | a picture, head | whether a thing of a colour and shape is there, and where |
+//! | [`path_planner`] | ranges, odometry | a way to a place, and how good it is |
 //! | [`coordinator`] | wishes, safety, decision | one command for the drive |
 //! | [`decision_maker`] | safety, target, risk, battery, odometry, load, signals | situations, goal, everybody's weight and orders, reasons |
 //! | [`resource_manager`] | the load of the computer, orders | periods, methods, budgets and rest for all |
@@ -28,7 +31,10 @@ pub mod drive;
 pub mod head;
 pub mod image_tracker;
 pub mod laser;
+pub mod lookout;
 pub mod odometry;
+pub mod path_planner;
+pub mod recogniser;
 pub mod resource_manager;
 pub mod safety_monitor;
 mod shared;
@@ -43,7 +49,10 @@ pub use drive::DriveBase;
 pub use head::PanTilt;
 pub use image_tracker::ImageTracker;
 pub use laser::Laser;
+pub use lookout::Lookout;
 pub use odometry::DeadReckoning;
+pub use path_planner::PathPlanner;
+pub use recogniser::Recogniser;
 pub use resource_manager::ResourceManager;
 pub use safety_monitor::SafetyMonitor;
 pub use sonar::Sonar;
@@ -56,9 +65,12 @@ pub fn registry() -> runtime::Registry {
         Laser,
         Camera,
         DeadReckoning,
+        Lookout,
         SafetyMonitor,
         WallFollower,
         ImageTracker,
+        Recogniser,
+        PathPlanner,
         PanTilt,
         Coordinator,
         DriveBase,
@@ -80,9 +92,12 @@ mod tests {
             "laser",
             "camera",
             "odometry",
+            "lookout",
             "safety-monitor",
             "wall-follower",
             "image-tracker",
+            "recogniser",
+            "path-planner",
             "head",
             "coordinator",
             "drive",

@@ -77,7 +77,7 @@ pub enum Refined {
     Final,
 }
 
-/// The potential around a goal, on blocks from coarse to fine. All memory is taken when it is made, about 60 bytes a cell.
+/// The potential around a goal, on blocks from coarse to fine. All memory is taken when it is made, about 70 bytes a cell.
 #[derive(Clone, Debug)]
 pub struct Field {
     width: u32,

@@ -128,7 +128,11 @@ impl ResourceManager {
         let most = self.params.memory * 1e6;
         let is_over = most > 0.0 && load.memory > most;
         if is_over && !self.over_memory {
-            runtime::note!("the process uses {} MB of memory, and may use {} MB", load.memory * 1e-6, self.params.memory);
+            runtime::note!(
+                "the process uses {} MB of memory, and may use {} MB",
+                load.memory * 1e-6,
+                self.params.memory
+            );
         }
         self.over_memory = is_over;
     }

@@ -3,3 +3,4 @@
 #![allow(clippy::unwrap_used)] // a test may
 
 mod deciding;
+mod seeing;
