@@ -203,6 +203,31 @@ mod tests {
     }
 
     #[test]
+    fn rows_of_all_kinds_get_their_sums() {
+        let mut old = with(&STEPS[..1]);
+        old.execute_batch(CUP).unwrap();
+        old.execute_batch(
+            "INSERT INTO fact (subject, predicate, object, source, confidence, time)
+                 VALUES ('cup', 'in', 'kitchen', 'camera', 0.5, 1);
+             INSERT INTO decision_table VALUES ('home', 1, 0, '{}'), ('home', 2, 0, '{ a = 1 }');
+             INSERT INTO pattern VALUES ('ball', 'colour', '', '{ hue_from = 350 }', x'');
+             INSERT INTO schedule VALUES ('bell', 'every', 0, 60, NULL, '{}'), ('once', 'once', 1, NULL, NULL, '{}');
+             INSERT INTO map VALUES ('hall', 0, 0.5, -0.0, 1, 2, 1, 1, x'07');",
+        )
+        .unwrap();
+        bring_up(&mut old, Path::new(FILE), STEPS).unwrap();
+        assert_eq!(check(&old, Path::new(FILE), STEPS), Ok(()));
+        let rows = |name: &str| -> (i64, i64) {
+            let sealed = format!(
+                "SELECT rows, (SELECT count(DISTINCT crc) FROM {name}) FROM seal WHERE name = '{name}'"
+            );
+            old.query_row(&sealed, [], |row| Ok((row.get(0)?, row.get(1)?))).unwrap()
+        };
+        let kinds = ["fact", "decision_table", "pattern", "schedule", "map"];
+        assert_eq!(kinds.map(rows), [(2, 2), (2, 2), (1, 1), (2, 2), (1, 1)]);
+    }
+
+    #[test]
     fn a_step_that_fails_changes_nothing() {
         let before = &STEPS[..1];
         let mut old = with(before);

@@ -66,6 +66,6 @@ proptest! {
                 Err(_) => errors += 1,
             }
         }
-        prop_assert!(errors > 20, "{} of 150 were seen", errors);
+        prop_assert!(errors > 5, "{} of 150 were seen", errors);
     }
 }

@@ -188,6 +188,10 @@ pub(crate) fn with_table(
         let entry = Entry { value: Value::Table(rows), at };
         section.push(Row { key: "decide".to_owned(), key_at: at, entry });
         decide::read(&mut reader, &section);
+        // What the decision maker itself says of its table; of the rest of the plan this is not the place to speak.
+        let judged = runtime::check(&reader.plan, registry);
+        let of_table = |mistake: &Mistake| (start..=start + length).contains(&mistake.at.start);
+        reader.mistakes.extend(judged.into_iter().filter(of_table));
     }
     let store = loaded.store.clone();
     reader.finish().map(|file| Loaded { store, ..file })

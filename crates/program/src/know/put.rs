@@ -70,7 +70,8 @@ pub(super) struct PatternArgs {
     /// The form of the file, as in image/png; seen by its first bytes when nothing is said.
     #[arg(long, value_name = "TYPE", requires = "from")]
     media_type: Option<String>,
-    /// What else belongs to it, as in hue=[0.9,1.1]; without a file it is a range of colours. May be given several times.
+    /// What else belongs to it; without a file it is a range of colours, as in hue_from=350 or hue=[5.9,0.3] (rad), saturation=0.4.
+    /// May be given several times.
     #[arg(long, value_name = "KEY=VALUE")]
     set: Vec<String>,
 }
@@ -82,10 +83,10 @@ pub(super) struct ScheduleArgs {
     /// By the calendar: minute hour day month weekday, as in "30 8 * * mon-fri".
     #[arg(long, value_name = "FIELDS", required_unless_present_any = ["every", "at"], conflicts_with_all = ["every", "at"])]
     cron: Option<Cron>,
-    /// Again and again after so long, as in 10min; from --at on, else from the zero of the clock on.
+    /// Again and again after so long, as in 10min; from --at on, else from the start of a run on.
     #[arg(long, value_name = "TIME", value_parser = duration)]
     every: Option<Duration>,
-    /// At this time of the clock, as in 30s; once, unless --every is given.
+    /// So long after the start of a run, as in 30s; once, unless --every is given.
     #[arg(long, value_name = "TIME")]
     at: Option<Duration>,
     /// What to ask, as the timed requests of a system file do.

@@ -9,6 +9,7 @@ fn schedules_fire_in_simulated_time_the_same_each_time() {
     home.put(schedule("bell", every(10, 30), "set wall keep=0.6"));
     home.put(schedule("eight", When::Cron("0 8 * * mon".parse().unwrap()), "set wall keep=0.7"));
     home.put(schedule("once", When::Once(Time::ZERO + Duration::secs(50)), "restart nobody"));
+    home.put(schedule("halt", When::Once(Time::ZERO + Duration::secs(20)), "stop"));
     home.put(schedule("wrong", every(0, 1), "falt wall panic"));
     let run = |out: &str| {
         let (scenario, knowing, told) = home.begun(&[]).unwrap();
@@ -29,6 +30,7 @@ fn schedules_fire_in_simulated_time_the_same_each_time() {
         fired,
         [
             (10.0, bell, keep),
+            (20.0, "schedule \"halt\"", "asked: stop"),
             (40.0, bell, keep),
             (
                 50.0,
@@ -42,6 +44,7 @@ fn schedules_fire_in_simulated_time_the_same_each_time() {
     let text = summary.to_text(false);
     for line in [
         "schedule \"bell\" asked for \"set wall keep=0.6\" at 10 s, and 2 more times until 70 s\n",
+        "schedule \"halt\" asked for \"stop\" at 20 s\n",
         "schedule \"eight\" asked for \"set wall keep=0.7\" at 60 s\n",
         "schedule \"once\" asked for \"restart nobody\"; refused: there is no agent \"nobody\"; it can be: decision, wall at 50 s\n",
     ] {
