@@ -55,7 +55,7 @@ pub struct Resident {
     pub counts: Counts,
     /// How long all its steps together used their processor.
     pub used: Duration,
-    /// How many steps it made of late, and how long the longest of them used its processor: of the last two to four seconds. In
+    /// How many steps it made of late, and how long the longest of them used its processor: of the last half second to a second. In
     /// simulated time without virtual processors steps take none.
     pub recent: (u64, Duration),
 }

@@ -164,7 +164,7 @@ impl ResourceManager {
         let Some(rule) = &mut self.rule else { return Ok(None) };
         let Self { model, params, orders_now, .. } = self;
         let system = model.system(census, host, params, now);
-        let managed = model.managed(census, &system, orders_now, own);
+        let managed = model.managed(census, orders_now, own);
         Ok(match rule {
             Rule::Elastic(governor) => governor.decide(now.0, &system, &managed).map_err(Fault::of)?,
             Rule::Ladder(ladder) => {

@@ -9,8 +9,6 @@ use types::{Duration, Time};
 
 use super::ResourceParams;
 
-/// After so many steps of late what was measured counts.
-const MEASURED_AFTER: u64 = 5;
 /// Where executors by deadline stand among the others, and so processes by deadline too.
 const ABOVE_ALL: u8 = 100;
 
@@ -54,13 +52,7 @@ impl Model {
     }
 
     /// What may be taken from each.
-    pub(super) fn managed(
-        &self,
-        census: &Census,
-        system: &System,
-        orders: &Orders,
-        own: &str,
-    ) -> Vec<Managed> {
+    pub(super) fn managed(&self, census: &Census, orders: &Orders, own: &str) -> Vec<Managed> {
         let residents = census.residents.iter().enumerate();
         residents
             .map(|(at, resident)| {
@@ -69,7 +61,7 @@ impl Model {
                 if resident.is_robot || name == own || resident.nominal.giving.is_rigid {
                     return Managed::rigid();
                 }
-                managed(resident, order, self.seen[at].0, census.overhead, system.agents[at].cost)
+                managed(resident, order, self.seen[at].0, census.overhead)
             })
             .collect()
     }
@@ -79,7 +71,7 @@ impl Model {
 fn look(resident: &Resident, seen: &mut (f64, Option<Time>), percent: i64, now: Time, believes: Duration) {
     let (steps, longest) = resident.recent;
     let declared = resident.plan.cost_of_step(resident.methods).unwrap_or(Duration::ZERO);
-    if steps >= MEASURED_AFTER && declared > Duration::ZERO {
+    if steps > 0 && declared > Duration::ZERO {
         // What an anytime agent took for refinements it took within its budget.
         let free = resident.plan.budget.unwrap_or(Duration::ZERO);
         let over = if free > Duration::ZERO { longest - free + declared } else { longest };
@@ -112,13 +104,7 @@ pub(super) fn nominal_gap(resident: &Resident) -> Option<Duration> {
     resident.nominal.giving.gap_max.and(resident.gap)
 }
 
-fn managed(
-    resident: &Resident,
-    order: Option<&Order>,
-    times: f64,
-    overhead: Duration,
-    cost: Exact,
-) -> Managed {
+fn managed(resident: &Resident, order: Option<&Order>, times: f64, overhead: Duration) -> Managed {
     let plan = &resident.nominal;
     let (nominal, longest) = match plan.period {
         Some(period) => (Some(period), plan.period_range.map(|(_, longest)| longest)),
@@ -135,7 +121,6 @@ fn managed(
         let least = base_of(resident, asked, times);
         Anytime { least: exact(least + overhead), most: exact(least.max(budget) + overhead) }
     });
-    let _ = cost;
     Managed {
         rigid: false,
         nominal: nominal.map(exact),

@@ -32,7 +32,10 @@ pub(crate) fn done(ready: &Ready, agents: &[AgentView], time: Duration) -> Vec<D
         let importance = plan.giving.importance?;
         let view = agents.iter().find(|agent| agent.name == plan.name)?;
         let rate = |period: schedule::Exact| *period.denom() as f64 / *period.numer() as f64;
-        let rates: f64 = found.streams.iter().map(|stream| rate(stream.period)).sum();
+        // What a message makes one with a period run besides is not what it was to do.
+        let is_periodic = plan.period.is_some();
+        let counts = |stream: &&schedule::system::Stream| !is_periodic || stream.after.is_none();
+        let rates: f64 = found.streams.iter().filter(counts).map(|stream| rate(stream.period)).sum();
         let steps = view.counts.releases as f64;
         let work = Work {
             importance,

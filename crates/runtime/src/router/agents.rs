@@ -321,7 +321,7 @@ impl Router {
                 let executor = known.executor;
                 staged.step(Step { executor, of: id, ring: None, what: What::Change(change) });
                 // To panic or hang is for once.
-                let lasts = matches!(fault, StepFault::Off | StepFault::Slow);
+                let lasts = matches!(fault, StepFault::Off | StepFault::Slow | StepFault::Heavy);
                 let fault = if lasts { fault } else { StepFault::None };
                 self.alter(id, staged, move |known| known.fault = fault);
             }

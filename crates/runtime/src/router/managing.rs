@@ -12,8 +12,9 @@ use crate::port::{Asked, ManagerEnd};
 use crate::request::Refusal;
 use crate::timetable::{Assumed, timetable};
 
-/// The span of the windows of what steps took: a load that has gone is forgotten after twice this.
-const SPAN: Duration = Duration::secs(1);
+/// The span of the windows of what steps took: a load that has gone is forgotten after twice this. Slower agents than two a second are seen less
+/// often than that, and what they took last is remembered elsewhere.
+const SPAN: Duration = Duration::millis(500);
 
 /// Who manages.
 #[derive(Default)]

@@ -191,8 +191,44 @@ impl<'a> Search<'a> {
     }
 
     /// Periods given back: those of the largest utilisation that fits, shared by elasticity.
+    ///
+    /// Those who wait for different things need not give way as much as each other: where some could have half of what they gave back, and
+    /// others not, the others stay as they are, and what is left is shared among those again.
     fn shortened(&self, rooms: &[Room], settings: Vec<Setting>) -> Result<Vec<Setting>, Unsound> {
-        let (places, springs) = self.springs(rooms, &settings);
+        let mut free = vec![true; rooms.len()];
+        let mut settings = self.compressed(rooms, settings, &free)?;
+        loop {
+            let mut held = false;
+            let lengthened = |at: &usize| free[*at] && settings[*at].period > rooms[*at].most().period;
+            for at in (0..rooms.len()).filter(lengthened).collect::<Vec<_>>() {
+                let (Some((from, _)), Some(period)) = (rooms[at].period, settings[at].period) else {
+                    continue;
+                };
+                let half = whole_between(from, period, near(from + (period - from) / Exact::from_integer(2)));
+                let mut back = settings.clone();
+                back[at].period = Some(half);
+                if !self.fits(&back)? {
+                    (free[at], held) = (false, true);
+                }
+            }
+            let some_are_free =
+                (0..rooms.len()).any(|at| free[at] && settings[at].period > rooms[at].most().period);
+            // Where each could have more by itself, all of them together could not.
+            if !held || !some_are_free {
+                return Ok(settings);
+            }
+            settings = self.compressed(rooms, settings, &free)?;
+        }
+    }
+
+    /// The same at once for those that are free; the others stay as they are.
+    fn compressed(
+        &self,
+        rooms: &[Room],
+        settings: Vec<Setting>,
+        free: &[bool],
+    ) -> Result<Vec<Setting>, Unsound> {
+        let (places, springs) = self.springs(rooms, &settings, free);
         let with = |target: f64| {
             let mut settings = settings.clone();
             for (at, room) in rooms.iter().enumerate() {
@@ -217,11 +253,12 @@ impl<'a> Search<'a> {
     }
 
     /// Those whose periods give way, with their places.
-    fn springs(&self, rooms: &[Room], settings: &[Setting]) -> (Vec<usize>, Vec<Spring>) {
+    fn springs(&self, rooms: &[Room], settings: &[Setting], free: &[bool]) -> (Vec<usize>, Vec<Spring>) {
         let spring = |at: usize| {
             let room = &rooms[at];
-            let (from, to) =
-                room.period.filter(|(from, to)| to > from && room.give > 0.0 && settings[at].active)?;
+            let (from, to) = room
+                .period
+                .filter(|(from, to)| to > from && room.give > 0.0 && settings[at].active && free[at])?;
             let cost = near(cost(&self.managed[at], &settings[at], self.system.agents[at].cost));
             // Who costs nothing may make others run that do.
             let cost = cost.max(1.0);
