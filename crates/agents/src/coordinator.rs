@@ -159,7 +159,8 @@ mod tests {
     }
 
     fn decide(rows: &[(&str, f64)]) -> Decision {
-        let row = |(agent, weight): &(&str, f64)| Row { agent: (*agent).into(), weight: *weight };
+        let row =
+            |(agent, weight): &(&str, f64)| Row { agent: (*agent).into(), weight: *weight, ..Row::default() };
         Decision { rows: rows.iter().map(row).collect(), ..Decision::default() }
     }
 

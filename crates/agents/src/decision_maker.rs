@@ -1,37 +1,64 @@
-//! The decision maker: danger and desire make a situation, and a table says what the situation gives to whom.
+//! The decision maker: what it hears makes situations, and a table says what the situations give to whom.
 //!
 //! ```text
-//!  safety ─▶ danger ─┐
-//!  risk ────────────▶├─▶ situation ─▶ row of the table ─▶ decision (weights, and why)
-//!  target ─▶ desire ─┘
+//!  safety, risk ──▶ danger ─┐
+//!  target ────────▶ desire ─┤             ┌ the six below ┐   rows of the    ┌▶ decision: situation, goal, weights
+//!  battery, odometry, load ─┼─▶ signals ─▶┤               ├─▶ table, by    ──┼▶ orders: importance, rate, activity, method
+//!  what agents tell ────────┘             └ "when" in the ┘   priority       └▶ reasons: signals, situations
+//!                                            table
 //! ```
 //!
-//! | situation | when | before |
+//! | built in | active when | priority |
 //! |---|---|---|
-//! | `blind` | the safety monitor is silent or sees nothing | all |
-//! | `target.near` | danger, and what is near is what is followed | `danger.near` |
-//! | `danger.near` | danger | all below |
-//! | `target.seen` | desire | all below |
-//! | `narrow` | little room on both sides | `free` |
-//! | `free` | else | |
+//! | `blind` | the safety monitor is silent or sees nothing | 100 |
+//! | `target.near` | danger, and what is near is what is followed | 90 |
+//! | `danger.near` | danger, and what is near is something else | 80 |
+//! | `target.seen` | desire | 70 |
+//! | those of the table | their `when` is true; once active, until their `until` is | 50 |
+//! | `narrow` | little room on both sides | 20 |
+//! | `free` | always | 0 |
 //!
 //! Danger and desire each have a level at which they begin and a lower one at which they end, so that a reading that trembles does not
-//! make the robot tremble.
+//! make the robot tremble; `when` and `until` do the same for a situation of one's own.
+//!
+//! Several situations are active together. For each agent, and for each kind of setting, the one of the highest priority counts that says
+//! something; so it is with the goal. Among equal priorities the order of the table decides. `blind` and `danger.near` silence everybody
+//! where the table has no weights for them. What the table's language is stands at [`DecisionParams::table`].
+
+mod condition;
+mod hearing;
+mod judgement;
+mod signal;
+mod situation;
+mod table;
+#[cfg(test)]
+mod tests;
 
 use runtime::{Agent, Fault, Input, Output, Step};
-use types::geometry::wrap;
-use types::messages::{Decision, Risk, Row, Safety, Target};
-use types::params::Params;
-use types::value::{Table, Value, nearest};
-use types::{Duration, Name, Sequence, Time};
+use types::messages::{Battery, Decision, Load, Odometry, Orders, Reasons, Risk, Safety, Signal, Target};
+use types::params::{ParamValue as _, Params};
+use types::value::{Mistake, Table};
+use types::{Duration, Time};
+
+pub use judgement::{Judgement, Verdict};
+pub use situation::Situation;
+pub use table::{DecisionTable, RESERVED, SETTINGS};
 
 use crate::shared::Dated;
+use hearing::Hearing;
+use signal::{Kind, Known, MOST_TOLD};
 
 /// The levels, and the table of the decisions.
 #[derive(Clone, Debug, Params)]
+#[params(check = whole)]
 pub struct DecisionParams {
-    /// For each situation the weight of each agent's offers, from 0 to 1, as in "danger.near" = { safety = 1.0, wall = 0.0 }. The section `[decide]` of a system file is this table.
-    pub table: Table,
+    /// For each situation what it gives to whom; the section `[decide]` of a system file is this table. A number is the weight of an agent's offers, from 0 to 1, as in "danger.near" = { safety = 1.0, wall = 0.0 }; a table can say more of an agent: weight and importance from 0 to 1, rate (the share of its nominal rate, above 0, to 1), active (true or false) and method (a word that it knows), as in track = { weight = 1.0, rate = 0.5, method = "exact" }.
+    /// Built in are the situations blind (priority 100), target.near (90), danger.near (80), target.seen (70), narrow (20) and free (0, always active). Any other row needs a condition: "battery.low" = { when = "battery < 0.2", until = "battery > 0.3", priority = 60, goal = "charge", track = 0.0 } begins when `when` is true and lasts until `until` is, or where there is none, until `when` is false. The priority is a whole number from 0 to 1000, 50 where the row says none, and can be said of built-in situations too. Several situations are active together: for each agent and each setting, and for the goal, the one of the highest priority counts that says something; the order in the table breaks ties. Where the table has no weights for blind or danger.near, these silence everybody.
+    /// A condition is made of numbers, true, false, signals, + - * /, the comparisons < <= > >= == !=, && (and), || (or), ! (not), brackets, min(a, b), max(a, b), abs(a) and known(signal). What nobody has sent, or what is too old, is unknown: a comparison with it is false, and known(...) tells.
+    /// Signals: danger and desire (0 to 1), risk (the greatest in front, 0 to 1), blind (yes or no), narrow (yes or no), nearest (m from the rim), nearest_bearing (rad), linear_max (m/s that are safe), safety_age (s since the last verdict), target_share (of the picture, 0 to 1), target_bearing (rad), target_visible (yes or no), target_age (s), battery (charge, 0 to 1), battery_age (s), speed (m/s ahead), turn (rad/s, counter-clockwise), load (mean share of the processors that is at work, 0 to 1), pressure (share of time in which somebody waited for a processor or for memory, the greater of the two), and the names of the parameter `signals`.
+    pub table: DecisionTable,
+    /// Names that agents tell by the input `signals`, for conditions to use, as in ["faces"]: at most 16. They are declared so that a misspelt word in a condition is found.
+    pub signals: Vec<String>,
     /// Danger from which on it is near (0 to 1). 0.95: a door is 0.85 and a slow approach to a wall stays below.
     #[param(default = 0.95, min = 0.0, max = 1.0)]
     pub danger_from: f64,
@@ -62,9 +89,56 @@ pub struct DecisionParams {
     /// A target older than this is none (time). 500 ms is seven pictures.
     #[param(default = Duration::millis(500), min = 0.01, max = 60.0)]
     pub target_age: Duration,
+    /// A reading of the battery older than this is none (time). 10 s: it changes within minutes, and drivers tell it every second or so.
+    #[param(default = Duration::secs(10), min = 0.01, max = 3600.0)]
+    pub battery_age: Duration,
+    /// An odometry older than this is none (time). 500 ms is ten readings at 20 Hz.
+    #[param(default = Duration::millis(500), min = 0.01, max = 60.0)]
+    pub motion_age: Duration,
+    /// A reading of the machine's load older than this is none (time). 5 s is a few readings at 1 Hz.
+    #[param(default = Duration::secs(5), min = 0.01, max = 3600.0)]
+    pub load_age: Duration,
 }
 
-/// Recognises the situation from danger and desire, and gives every agent the weight that the table has for it.
+/// What is wrong with table and signals together, as they were read.
+fn whole(params: &DecisionParams, read: &Table) -> Vec<Mistake> {
+    let mut mistakes = Vec::new();
+    let signals = read.get("signals");
+    let of_texts = signals.is_none_or(|entry| Vec::<String>::from_value(&entry.value).is_some());
+    for entry in signals.and_then(|entry| entry.value.as_list()).unwrap_or_default() {
+        let Some(name) = entry.value.as_text() else { continue };
+        mistakes.extend(signal_mistake(name).map(|what| Mistake::new(entry.at, what)));
+    }
+    if let Some(entry) = signals.filter(|_| params.signals.len() > MOST_TOLD) {
+        let count = params.signals.len();
+        mistakes.push(Mistake::new(entry.at, format!("{count} signals are too many: {MOST_TOLD} have room")));
+    }
+    if let Some(table) = read.get("table").and_then(|entry| entry.value.as_table()) {
+        // Where the names could not be read, no word is said to be unknown for it.
+        mistakes.extend(DecisionTable::mistakes(table, of_texts.then_some(&params.signals)));
+    }
+    mistakes
+}
+
+/// Why a name cannot be that of a signal.
+fn signal_mistake(name: &str) -> Option<String> {
+    let is_part = |c: char| c.is_ascii_alphanumeric() || c == '_';
+    let is_word = name.starts_with(|c: char| c.is_ascii_alphabetic()) && name.chars().all(is_part);
+    if Known::ALL.iter().any(|known| known.name() == name) {
+        return Some(format!("\"{name}\" is a signal that every decision maker knows"));
+    }
+    if !is_word || name.len() > 23 {
+        return Some(format!("\"{name}\" is no name for a signal: it has letters, digits and _, 23 at most"));
+    }
+    None
+}
+
+/// Whether a signal is yes or no, and no number.
+pub fn is_truth(signal: &str) -> bool {
+    Known::ALL.iter().any(|known| known.name() == signal && known.kind() == Kind::Truth)
+}
+
+/// Recognises situations from what it hears, and gives every agent what the table has for it.
 #[derive(Agent)]
 pub struct DecisionMaker {
     /// What the safety monitor says.
@@ -73,305 +147,68 @@ pub struct DecisionMaker {
     target: Input<Target>,
     /// The risk in each direction.
     risk: Input<Risk>,
-    /// Situation, weights and reasons.
+    /// What is left in the battery.
+    battery: Input<Battery>,
+    /// How the robot moves.
+    odometry: Input<Odometry>,
+    /// How much the machine has to do.
+    load: Input<Load>,
+    /// Numbers that agents tell, for conditions of the table; of each name the newest counts, while it holds.
+    signals: Input<Signal>,
+    /// Situation, goal and weights, in every step.
     #[port(history = 256)]
     decision: Output<Decision>,
+    /// What agents are to do besides, when it changes and once a second.
+    orders: Output<Orders>,
+    /// What the decision of the same time was made from, in every step.
+    #[port(history = 256)]
+    reasons: Output<Reasons>,
     params: DecisionParams,
+    hearing: Hearing,
     judgement: Judgement,
+    /// The last orders, and when they were sent.
+    told: Option<(Orders, Time)>,
 }
 
-impl Agent for DecisionMaker {
-    fn start(&mut self, _: &mut Step) -> Result<(), Fault> {
-        check(&self.params.table)
-    }
+/// Orders that stay the same are sent so often.
+const TELL_AGAIN: Duration = Duration::secs(1);
 
+impl Agent for DecisionMaker {
     fn step(&mut self, step: &mut Step) -> Result<(), Fault> {
-        if let Some(received) = self.safety.newest() {
-            self.judgement.safety = Some(Dated { value: *received, stamp: received.header().stamp });
+        self.listen();
+        let values = self.hearing.values(&self.params, step.now);
+        let before = self.judgement.situation();
+        let Verdict { decision, orders, reasons } = self.judgement.judge(&self.params, &values);
+        if decision.situation != before {
+            runtime::note!("another situation: danger {}, desire {}", decision.danger, decision.desire);
         }
-        if let Some(received) = self.target.newest() {
-            self.judgement.target = Some(Dated { value: *received, stamp: received.header().stamp });
-        }
-        if let Some(received) = self.risk.newest() {
-            self.judgement.risk = Some(Dated { value: *received, stamp: received.header().stamp });
-        }
-        let decision = self.judgement.decide(&self.params, step.now);
+        self.reasons.send(reasons);
         self.decision.send(decision);
+        let is_news = |(told, at): &(Orders, Time)| *told != orders || step.now - *at >= TELL_AGAIN;
+        if self.told.as_ref().is_none_or(is_news) {
+            self.told = Some((orders, step.now));
+            self.orders.send(orders);
+        }
         Ok(())
     }
 }
 
-/// What the decision maker can recognise.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum Situation {
-    /// Nothing is known of the surroundings.
-    #[default]
-    Blind,
-    /// What is near is what is followed.
-    TargetNear,
-    /// Something is too near.
-    DangerNear,
-    /// There is something to follow.
-    TargetSeen,
-    /// There is little room on both sides.
-    Narrow,
-    /// Nothing of all that.
-    Free,
-}
-
-impl Situation {
-    /// All of them, the first before the others.
-    pub const ALL: [Situation; 6] = [
-        Situation::Blind,
-        Situation::TargetNear,
-        Situation::DangerNear,
-        Situation::TargetSeen,
-        Situation::Narrow,
-        Situation::Free,
-    ];
-
-    /// Its key in the table.
-    pub const fn name(self) -> &'static str {
-        match self {
-            Situation::Blind => "blind",
-            Situation::TargetNear => "target.near",
-            Situation::DangerNear => "danger.near",
-            Situation::TargetSeen => "target.seen",
-            Situation::Narrow => "narrow",
-            Situation::Free => "free",
-        }
-    }
-
-    /// The situation whose row counts where the table has none for this one.
-    const fn next_best(self) -> Option<Situation> {
-        match self {
-            Situation::TargetNear => Some(Situation::TargetSeen),
-            Situation::Narrow | Situation::TargetSeen => Some(Situation::Free),
-            Situation::Blind | Situation::DangerNear | Situation::Free => None,
+impl DecisionMaker {
+    fn listen(&mut self) {
+        newest(&mut self.safety, &mut self.hearing.safety);
+        newest(&mut self.target, &mut self.hearing.target);
+        newest(&mut self.risk, &mut self.hearing.risk);
+        newest(&mut self.battery, &mut self.hearing.battery);
+        newest(&mut self.odometry, &mut self.hearing.odometry);
+        newest(&mut self.load, &mut self.hearing.load);
+        while let Some(received) = self.signals.take() {
+            self.hearing.told(&self.params.signals, *received, received.header().stamp);
         }
     }
 }
 
-/// Refuses a table that names a situation which is never recognised, or a weight that is none.
-fn check(table: &Table) -> Result<(), Fault> {
-    let names = Situation::ALL.map(Situation::name);
-    for row in table.rows() {
-        let key = row.key.as_str();
-        if !names.contains(&key) {
-            let help = nearest(key, names).map_or(String::new(), |near| format!("; do you mean \"{near}\"?"));
-            return Err(Fault::of(format!("no situation is called \"{key}\"{help}")));
-        }
-        let agents = row.entry.value.as_table().ok_or_else(|| {
-            Fault::of(format!(
-                "\"{key}\" needs a weight for each agent, as in {{ safety = 1.0, wall = 0.0 }}"
-            ))
-        })?;
-        if let Some(bad) = agents.rows().iter().find(|row| weight(&row.entry.value).is_none()) {
-            return Err(Fault::of(format!(
-                "the weight of \"{}\" in \"{key}\" is a number from 0 to 1",
-                bad.key
-            )));
-        }
-    }
-    Ok(())
-}
-
-fn weight(value: &Value) -> Option<f64> {
-    value.as_float().filter(|weight| (0.0..=1.0).contains(weight))
-}
-
-/// What was heard last, and what was decided.
-#[derive(Clone, Copy, Debug, Default)]
-struct Judgement {
-    safety: Option<Dated<Safety>>,
-    target: Option<Dated<Target>>,
-    risk: Option<Dated<Risk>>,
-    endangered: bool,
-    desiring: bool,
-    situation: Situation,
-    before: Situation,
-}
-
-impl Judgement {
-    fn decide(&mut self, params: &DecisionParams, now: Time) -> Decision {
-        let safety = Dated::fresh(&self.safety, now, params.safety_age).filter(|safety| !safety.blind);
-        let target = Dated::fresh(&self.target, now, params.target_age).unwrap_or_default();
-        let danger = safety.map_or(1.0, |safety| safety.danger.max(self.risk_ahead(params, now)));
-        let with_hysteresis =
-            |is: bool, value: f64, from: f64, until: f64| value >= if is { until.min(from) } else { from };
-        self.endangered = with_hysteresis(self.endangered, danger, params.danger_from, params.danger_until);
-        self.desiring =
-            with_hysteresis(self.desiring, target.desire, params.desire_from, params.desire_until);
-        let situation = match safety {
-            None => Situation::Blind,
-            Some(safety) if self.endangered && self.is_the_target(params, &safety, &target) => {
-                Situation::TargetNear
-            }
-            Some(_) if self.endangered => Situation::DangerNear,
-            Some(_) if self.desiring => Situation::TargetSeen,
-            Some(safety) if safety.narrow => Situation::Narrow,
-            Some(_) => Situation::Free,
-        };
-        if situation != self.situation {
-            (self.before, self.situation) = (self.situation, situation);
-            runtime::note!("another situation: danger {}, desire {}", danger, target.desire);
-        }
-        let rows = rows_of(&params.table, situation);
-        Decision {
-            situation: situation.name().into(),
-            before: self.before.name().into(),
-            active: strongest(&rows),
-            danger,
-            desire: target.desire,
-            rows,
-        }
-    }
-
-    /// The greatest risk in front, as far as it counts. A direction of which nothing is known adds none: safety judges that.
-    fn risk_ahead(&self, params: &DecisionParams, now: Time) -> f64 {
-        let Some(risk) = Dated::fresh(&self.risk, now, params.safety_age) else { return 0.0 };
-        let bearing = |i: usize| wrap(f64::from(risk.angle_min) + i as f64 * f64::from(risk.angle_step));
-        let ahead = risk.values.iter().enumerate().filter(|(i, _)| bearing(*i).abs() <= params.front);
-        params.risk_share * ahead.map(|(_, risk)| f64::from(*risk)).fold(0.0, f64::max)
-    }
-
-    /// Whether the thing that is near is the one that is followed: then it is faced, not fled.
-    fn is_the_target(&self, params: &DecisionParams, safety: &Safety, target: &Target) -> bool {
-        let off = wrap(safety.nearest_bearing - target.bearing).abs();
-        self.desiring && target.share >= params.target_share && off <= params.target_width
-    }
-}
-
-/// The weights of a situation, or of the next best one that the table has.
-fn rows_of(table: &Table, situation: Situation) -> Sequence<Row, 12> {
-    let mut wanted = Some(situation);
-    while let Some(situation) = wanted {
-        if let Some(agents) = table.get(situation.name()).and_then(|entry| entry.value.as_table()) {
-            let rows = agents.rows().iter();
-            return rows
-                .filter_map(|row| Some(Row { agent: Name::new(&row.key), weight: weight(&row.entry.value)? }))
-                .collect();
-        }
-        wanted = situation.next_best();
-    }
-    Sequence::new()
-}
-
-/// The agent with the greatest weight, the first of equals; nobody when all are silenced.
-fn strongest(rows: &[Row]) -> Name {
-    let none = Row::default();
-    rows.iter().fold(none, |best, row| if row.weight > best.weight { *row } else { best }).agent
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    fn weights(rows: &[(&str, f64)]) -> Table {
-        let mut table = Table::new();
-        rows.iter().for_each(|(agent, weight)| table.set(agent, Value::Float(*weight)));
-        table
-    }
-
-    fn params() -> DecisionParams {
-        let mut table = Table::new();
-        for (situation, rows) in [
-            ("danger.near", [("safety", 1.0), ("track", 0.0), ("wall", 0.0)]),
-            ("target.seen", [("safety", 0.0), ("track", 1.0), ("wall", 0.0)]),
-            ("free", [("safety", 0.0), ("track", 0.0), ("wall", 1.0)]),
-        ] {
-            table.set(situation, Value::Table(weights(&rows)));
-        }
-        DecisionParams { table, ..DecisionParams::default() }
-    }
-
-    /// A judgement that has just heard these.
-    fn heard(danger: f64, desire: f64) -> Judgement {
-        let safety = Safety { danger, nearest_bearing: 2.0, ..Safety::default() };
-        let target = Target { desire, share: 0.05, visible: desire > 0.0, ..Target::default() };
-        Judgement {
-            safety: Some(Dated { value: safety, stamp: Time::ZERO }),
-            target: Some(Dated { value: target, stamp: Time::ZERO }),
-            ..Judgement::default()
-        }
-    }
-
-    fn decide(mut judgement: Judgement) -> (String, String) {
-        let decision = judgement.decide(&params(), Time::ZERO);
-        (decision.situation.as_str().to_owned(), decision.active.as_str().to_owned())
-    }
-
-    fn pair(situation: &str, active: &str) -> (String, String) {
-        (situation.to_owned(), active.to_owned())
-    }
-
-    #[test]
-    fn danger_beats_desire_and_desire_beats_the_wall() {
-        assert_eq!(decide(heard(0.2, 0.0)), pair("free", "wall"));
-        assert_eq!(decide(heard(0.2, 1.0)), pair("target.seen", "track"));
-        assert_eq!(decide(heard(1.0, 1.0)), pair("danger.near", "safety"));
-    }
-
-    #[test]
-    fn what_is_near_and_followed_is_faced() {
-        let mut judgement = heard(1.0, 1.0);
-        judgement.safety.as_mut().unwrap().value.nearest_bearing = 0.3;
-        assert_eq!(decide(judgement), pair("target.near", "track"), "with the row of the next best");
-    }
-
-    #[test]
-    fn narrow_without_a_row_is_as_free() {
-        let mut judgement = heard(0.2, 0.0);
-        judgement.safety.as_mut().unwrap().value.narrow = true;
-        assert_eq!(decide(judgement), pair("narrow", "wall"));
-    }
-
-    #[test]
-    fn silence_of_safety_is_blindness_and_moves_nobody() {
-        assert_eq!(decide(Judgement::default()), pair("blind", ""));
-        let mut judgement = heard(0.2, 1.0);
-        let late = Time::ZERO + Duration::millis(701);
-        assert_eq!(judgement.decide(&params(), late).situation.as_str(), "blind");
-    }
-
-    #[test]
-    fn a_trembling_reading_changes_nothing_between_the_two_levels() {
-        let params = params();
-        let mut judgement = heard(0.0, 0.0);
-        let situations: Vec<_> = [0.94, 0.96, 0.94, 0.86, 0.84, 0.94]
-            .into_iter()
-            .map(|danger| {
-                judgement.safety.as_mut().unwrap().value.danger = danger;
-                judgement.decide(&params, Time::ZERO).situation.as_str().to_owned()
-            })
-            .collect();
-        assert_eq!(situations, ["free", "danger.near", "danger.near", "danger.near", "free", "free"]);
-        assert_eq!(judgement.decide(&params, Time::ZERO).before.as_str(), "danger.near");
-    }
-
-    #[test]
-    fn risk_counts_in_front_only() {
-        let params = params();
-        let mut risk =
-            Risk { angle_step: 1.0, values: [1.0, 0.0, 0.0].into_iter().collect(), ..Risk::default() };
-        let danger = |risk: Risk| {
-            let mut judgement = heard(0.2, 0.0);
-            judgement.risk = Some(Dated { value: risk, stamp: Time::ZERO });
-            judgement.decide(&params, Time::ZERO).danger
-        };
-        assert_eq!(danger(risk), 0.9);
-        risk.values = [0.0, 1.0, 0.0].into_iter().collect();
-        assert_eq!(danger(risk), 0.2);
-    }
-
-    #[test]
-    fn a_table_with_a_wrong_word_is_refused_with_the_right_one() {
-        let mut table = Table::new();
-        table.set("danger.nearr", Value::Table(weights(&[("safety", 1.0)])));
-        assert!(check(&table).unwrap_err().what.contains("do you mean \"danger.near\"?"));
-        let mut table = Table::new();
-        table.set("free", Value::Table(weights(&[("wall", 1.5)])));
-        assert!(check(&table).unwrap_err().what.contains("\"wall\""));
-        assert_eq!(check(&params().table), Ok(()));
+fn newest<T: types::Message>(input: &mut Input<T>, heard: &mut Option<Dated<T>>) {
+    if let Some(received) = input.newest() {
+        *heard = Some(Dated { value: *received, stamp: received.header().stamp });
     }
 }

@@ -13,7 +13,7 @@
 //! | [`wall_follower`] | ranges, odometry | a wish to drive along the wall |
 //! | [`image_tracker`] | HSI picture, head | the target, wishes for feet and head |
 //! | [`coordinator`] | wishes, safety, decision | one command for the drive |
-//! | [`decision_maker`] | safety, target, risk | the situation and everybody's weight |
+//! | [`decision_maker`] | safety, target, risk, battery, odometry, load, signals | situations, goal, everybody's weight and orders, reasons |
 //! | [`drive`] | a command, orders of people, a reflex | what the wheels can do of it |
 //! | [`head`] | wishes, orders of people | what the head can do of it |
 //!

@@ -1,7 +1,7 @@
 //! Parameters.
 
 use quote::quote;
-use syn::{DeriveInput, Expr, Field};
+use syn::{DeriveInput, Expr, Field, Path};
 
 use crate::names::{doc, ident, named_fields, path_to};
 
@@ -37,11 +37,30 @@ fn said(field: &Field) -> syn::Result<Said> {
     Ok(said)
 }
 
+/// The function that says what is wrong with the whole.
+fn check(input: &DeriveInput) -> syn::Result<Option<Path>> {
+    let mut check = None;
+    for attribute in input.attrs.iter().filter(|a| a.path().is_ident("params")) {
+        attribute.parse_nested_meta(|meta| {
+            if !meta.path.is_ident("check") {
+                return Err(meta.error("a struct of parameters has `check`"));
+            }
+            check = Some(meta.value()?.parse()?);
+            Ok(())
+        })?;
+    }
+    Ok(check)
+}
+
 pub(crate) fn derive(input: DeriveInput) -> syn::Result<proc_macro2::TokenStream> {
     let types = path_to("types");
     let name = &input.ident;
     let (mut rows, mut sets, mut gets, mut defaults) = (Vec::new(), Vec::new(), Vec::new(), Vec::new());
     let mut writes_default = false;
+    let mut checks = Vec::new();
+    if let Some(check) = check(&input)? {
+        checks.push(quote!(mistakes.extend(#check(self, table));));
+    }
     for field in named_fields(&input)? {
         let (id, ty, doc) = (ident(field)?, &field.ty, doc(&field.attrs));
         let key = id.to_string();
@@ -52,6 +71,7 @@ pub(crate) fn derive(input: DeriveInput) -> syn::Result<proc_macro2::TokenStream
             None => quote!(#id: ::core::default::Default::default()),
         });
         if said.flatten {
+            checks.push(quote!(mistakes.extend(#types::params::Params::check(&self.#id, table));));
             rows.push(quote!(rows.extend(<#ty as #types::params::Params>::fields());));
             sets.push(quote! {
                 if let ::core::option::Option::Some(done) = #types::params::Params::set(&mut self.#id, key, value) {
@@ -133,6 +153,14 @@ pub(crate) fn derive(input: DeriveInput) -> syn::Result<proc_macro2::TokenStream
             fn get(&self, key: &str) -> ::core::option::Option<#types::value::Value> {
                 #(#gets)*
                 ::core::option::Option::None
+            }
+
+            #[allow(unused_variables)]
+            fn check(&self, table: &#types::value::Table) -> #types::params::Mistakes {
+                #[allow(unused_mut)]
+                let mut mistakes = #types::params::Mistakes::new();
+                #(#checks)*
+                mistakes
             }
         }
     })

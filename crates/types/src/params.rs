@@ -31,6 +31,9 @@ pub struct ParamField {
 /// What is known of all parameters of an agent.
 pub type Fields = Vec<ParamField>;
 
+/// What is wrong with parameters as a whole.
+pub type Mistakes = Vec<Mistake>;
+
 /// Why a value was not taken.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Refused(pub String);
@@ -71,6 +74,13 @@ pub trait Params: Default + Clone + Send + 'static {
     /// The value of the parameter named `key`.
     fn get(&self, key: &str) -> Option<Value>;
 
+    /// What is wrong with the whole that was read from `table`: what no value can tell by itself, each with its place.
+    /// `#[params(check = path)]` on a struct names the function that says it.
+    fn check(&self, table: &Table) -> Mistakes {
+        let _ = table;
+        Mistakes::new()
+    }
+
     /// The defaults, changed by the rows of `table`; all mistakes at once, unknown keys with the nearest right one.
     fn read(table: &Table, owner: &str) -> Result<Self, Vec<Mistake>> {
         let mut params = Self::default();
@@ -93,6 +103,7 @@ pub trait Params: Default + Clone + Send + 'static {
                 }
             }
         }
+        mistakes.extend(params.check(table));
         if mistakes.is_empty() { Ok(params) } else { Err(mistakes) }
     }
 

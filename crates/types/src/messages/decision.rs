@@ -39,6 +39,9 @@ pub struct Target {
     pub visible: bool,
 }
 
+/// How many agents a decision has room for.
+pub const MOST_AGENTS: usize = 12;
+
 /// What a decision gives one agent.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Field)]
 #[repr(C)]
@@ -47,13 +50,15 @@ pub struct Row {
     pub agent: Name,
     /// The weight of its offers, from 0 to 1.
     pub weight: f64,
+    /// The situation whose row says so.
+    pub by: Name,
 }
 
 /// What the decision maker recognises, and what it sets.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Message)]
 #[repr(C)]
 pub struct Decision {
-    /// The situation, a key of the decision table.
+    /// The situation, a key of the decision table: of those that are active the one of the highest priority.
     pub situation: Name,
     /// The situation before.
     pub before: Name,
@@ -63,6 +68,8 @@ pub struct Decision {
     pub danger: f64,
     /// The desire it was decided on, from 0 to 1.
     pub desire: f64,
+    /// What the robot is to strive for; empty where no active situation says.
+    pub goal: Name,
     /// The weights.
-    pub rows: Sequence<Row, 12>,
+    pub rows: Sequence<Row, MOST_AGENTS>,
 }

@@ -1,0 +1,5 @@
+//! Ready-made agents in whole systems.
+
+#![allow(clippy::unwrap_used)] // a test may
+
+mod deciding;
