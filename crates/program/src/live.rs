@@ -1,7 +1,10 @@
 //! The commands that ask or change a system that runs in another process.
 
+mod because;
 mod shown;
+pub(crate) mod why;
 
+use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 use std::time::Duration as HostDuration;
 
@@ -38,11 +41,14 @@ pub(crate) enum LiveCommand {
     },
     /// Shows timing and counts, again and again on a terminal.
     Top(Which),
-    /// Shows the last decisions with their reasons.
+    /// Shows the last changes of the decision: situations, what they were recognised by, whose rows count, and what is new.
     Why {
         /// How many.
         #[arg(value_name = "N", default_value_t = 10)]
         count: usize,
+        /// Of a run that was recorded.
+        #[arg(long, value_name = "F.mcap", conflicts_with = "system")]
+        log: Option<PathBuf>,
         #[command(flatten)]
         which: Which,
     },
@@ -136,14 +142,24 @@ pub(crate) fn live(command: LiveCommand, json: bool) -> Result<ExitCode, Failure
         LiveCommand::Ls(which) => show(&which, "ls", shown::ls, json),
         LiveCommand::Graph { dot, toml, which } => graph(&which, dot, toml, json),
         LiveCommand::Top(which) => top(&which, json),
-        LiveCommand::Why { count, which } => {
+        LiveCommand::Why { count, log: Some(log), .. } => why_of_log(&log, count, json),
+        LiveCommand::Why { count, log: None, which } => {
             let answer = ask(&mut connect(&which)?, &["why".to_owned(), count.to_string()])?;
-            show_answer(&answer, shown::why, json);
+            show_answer(&answer, because::why, json);
             Ok(ExitCode::SUCCESS)
         }
         LiveCommand::Tap { port, every, count, which } => tap(&which, &port, every, count, json),
         _ => Ok(ExitCode::SUCCESS),
     }
+}
+
+fn why_of_log(log: &Path, count: usize, json: bool) -> Result<ExitCode, Failure> {
+    let answer = why::of_log(log, count).map_err(|error| Failure::new(error.to_string()))?;
+    if count > 0 && answer.as_array().is_some_and(Vec::is_empty) {
+        return Err(Failure::new(format!("{} holds no decision", log.display())).code(1));
+    }
+    show_answer(&answer, because::why, json);
+    Ok(ExitCode::SUCCESS)
 }
 
 fn connect(which: &Which) -> Result<Client, Failure> {

@@ -259,20 +259,43 @@ fn wires() -> Json {
 }
 
 fn decide() -> Json {
-    let situations: Vec<(&str, Json)> = agents::decision_maker::Situation::ALL
-        .iter()
-        .map(|situation| {
-            (
-                situation.name(),
-                json!({"type": "object", "description": "The weight of each agent, from 0 to 1."}),
-            )
+    let share = |doc: &str| json!({"type": "number", "minimum": 0, "maximum": 1, "description": doc});
+    let rate = json!({"type": "number", "exclusiveMinimum": 0, "maximum": 1,
+        "description": "The share of its nominal rate."});
+    let settings = closed(
+        [
+            ("weight", share("The weight of its offers.")),
+            ("importance", share("How much it matters.")),
+            ("rate", rate),
+            ("active", json!({"type": "boolean", "description": "Whether it is to work."})),
+            ("method", text("How it is to work, in a word that it knows.")),
+        ],
+        &[],
+    );
+    let of_agent = json!({"anyOf": [share("The weight of its offers."), settings]});
+    let row = |doc: &str| {
+        json!({
+            "type": "object",
+            "properties": object([
+                ("when", text("The condition under which the situation begins, as in battery < 0.2.")),
+                ("until", text("The condition under which it ends; where it is missing, the situation ends with its beginning.")),
+                ("priority", json!({"type": "integer", "minimum": 0, "maximum": 1000,
+                    "description": "The active situation of the highest priority counts that says something."})),
+                ("goal", text("What the robot is to strive for.")),
+            ]),
+            "additionalProperties": of_agent,
+            "description": doc,
         })
-        .collect();
+    };
+    let built_in = agents::decision_maker::Situation::ALL;
+    let built_in = built_in.map(|situation| (situation.name(), row("What each agent is given.")));
+    // A name without quotes is a table in a table for TOML.
+    let nested = json!({"type": "object", "additionalProperties": {"type": "object"}});
     json!({
         "type": "object",
-        "properties": object(situations),
-        "additionalProperties": {"type": "object"},
-        "description": "Whose offer counts how much in which situation.",
+        "properties": object(built_in),
+        "additionalProperties": {"anyOf": [row("A situation of one's own: when it is active, and what each agent is given."), nested]},
+        "description": "What counts how much in which situation.",
     })
 }
 

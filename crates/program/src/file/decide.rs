@@ -1,7 +1,7 @@
 //! `[decide]`: the table of the decision maker.
 
 use agents::DecisionMaker;
-use agents::decision_maker::Situation;
+use agents::decision_maker::{DecisionTable, SETTINGS, Situation};
 use runtime::Declare as _;
 use types::value::{Entry, Mistake, Row, Span, Table, Value};
 
@@ -22,7 +22,7 @@ pub(super) fn read(reader: &mut Reader<'_>, tree: &Table) {
     };
     let mut joined = Table::new();
     flatten(table, &mut joined);
-    check(reader, &joined);
+    agents(reader, &joined);
     let mut makers = reader.plan.agents.iter_mut().filter(|agent| agent.kind == KIND);
     let mistake = match (makers.next(), makers.next()) {
         (None, _) => Some(
@@ -38,51 +38,26 @@ pub(super) fn read(reader: &mut Reader<'_>, tree: &Table) {
             format!("agent \"{}\" has a \"{PARAM}\" of its own beside [decide]", maker.name),
         )),
         (Some(maker), None) => {
+            // What is wrong in it is told with the other parameters, which may declare signals.
             maker.params.set(PARAM, Entry { value: Value::Table(joined), at: entry.at });
-            None
+            return;
         }
     };
     reader.mistakes.extend(mistake);
+    reader.mistakes.extend(DecisionTable::mistakes(&joined, None));
 }
 
-fn check(reader: &mut Reader<'_>, table: &Table) {
-    judge(table, &mut reader.mistakes);
-    for weights in table.rows().iter().filter_map(|row| row.entry.value.as_table()) {
-        for weight in weights.rows().iter().filter(|weight| reader.plan.agent(&weight.key).is_none()) {
-            let mistake = reader.no_agent(&weight.key, weight.key_at);
-            reader.mistakes.push(mistake);
-        }
-    }
-}
-
-/// What is wrong with a table whoever the agents are: situations that nobody recognises, and weights that are none.
-fn judge(table: &Table, mistakes: &mut Vec<Mistake>) {
-    for row in table.rows() {
-        if !Situation::ALL.iter().any(|situation| situation.name() == row.key) {
-            let known = Situation::ALL.map(Situation::name);
-            mistakes.push(Mistake::unknown(row.key_at, "situation", &row.key, known));
-        }
-        let Some(weights) = row.entry.value.as_table() else {
-            mistakes.push(
-                Mistake::new(row.entry.at, format!("\"{}\" must be a table of weights", row.key))
-                    .help("as in { safety = 1.0, wall = 0.0 }"),
-            );
-            continue;
-        };
-        for weight in weights.rows() {
-            if !weight.entry.value.as_float().is_some_and(|weight| (0.0..=1.0).contains(&weight)) {
-                let what = format!(
-                    "the weight of \"{}\" is {}, not a number from 0 to 1",
-                    weight.key, weight.entry.value
-                );
-                mistakes.push(Mistake::new(weight.entry.at, what));
-            }
-        }
+/// Whoever is named must be there.
+fn agents(reader: &mut Reader<'_>, table: &Table) {
+    for agent in DecisionTable::agents(table).filter(|agent| reader.plan.agent(&agent.key).is_none()) {
+        let mistake = reader.no_agent(&agent.key, agent.key_at);
+        reader.mistakes.push(mistake);
     }
 }
 
 /// Reads a table that stands by itself: the rows of a file, or of its section `[decide]`, else those of `base`; then the
-/// `KEY=VALUE` changes. `text` is the name of the file and what stands in it.
+/// `KEY=VALUE` changes. `text` is the name of the file and what stands in it. Any word of a condition may be a signal here: who tells it
+/// is known where the table is used.
 ///
 /// # Errors
 /// All mistakes.
@@ -103,7 +78,7 @@ pub(crate) fn read_alone(
     for assignment in sets {
         list.extend(set::set_in(&mut table, &mut sources, assignment, "decide").err());
     }
-    judge(&table, &mut list);
+    list.extend(DecisionTable::mistakes(&table, None));
     list.sort_by_key(|mistake| mistake.at.start);
     if list.is_empty() { Ok(table) } else { Err(Mistakes { sources, list }) }
 }
@@ -111,17 +86,29 @@ pub(crate) fn read_alone(
 /// Names without quotes are tables in tables for TOML: they are joined again.
 fn flatten(table: &Table, out: &mut Table) {
     for row in table.rows() {
-        let nested = row.entry.value.as_table().filter(|inner| {
-            !inner.is_empty() && inner.rows().iter().all(|row| row.entry.value.as_table().is_some())
-        });
+        let nested =
+            row.entry.value.as_table().filter(|inner| {
+                !inner.is_empty() && inner.rows().iter().all(|deeper| is_row(&row.key, deeper))
+            });
         match nested {
             Some(inner) => {
                 for deeper in inner.rows() {
                     let key_at = Span { start: row.key_at.start, end: deeper.key_at.end };
-                    out.push(Row { key: format!("{}.{}", row.key, deeper.key), key_at, ..deeper.clone() });
+                    out.push(Row { key: joined(&row.key, deeper), key_at, ..deeper.clone() });
                 }
             }
             None => out.push(row.clone()),
         }
     }
+}
+
+fn joined(key: &str, deeper: &Row) -> String {
+    format!("{key}.{}", deeper.key)
+}
+
+/// Whether a table in a table is the row of a situation, and not what the outer one says of an agent.
+fn is_row(key: &str, deeper: &Row) -> bool {
+    let Some(table) = deeper.entry.value.as_table() else { return false };
+    let has = |keys: &[&str]| table.rows().iter().any(|row| keys.contains(&row.key.as_str()));
+    has(&["when"]) || Situation::named(&joined(key, deeper)).is_some() || !has(&SETTINGS)
 }

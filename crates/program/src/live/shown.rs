@@ -6,11 +6,11 @@ use serde_json::Value as Json;
 
 use crate::run::{span, table};
 
-fn rows<'a>(json: &'a Json, key: &str) -> impl Iterator<Item = &'a Json> + use<'a> {
+pub(super) fn rows<'a>(json: &'a Json, key: &str) -> impl Iterator<Item = &'a Json> + use<'a> {
     json[key].as_array().map(Vec::as_slice).unwrap_or_default().iter()
 }
 
-fn text(json: &Json) -> String {
+pub(super) fn text(json: &Json) -> String {
     match json {
         Json::String(text) => text.clone(),
         Json::Null => "-".to_owned(),
@@ -181,32 +181,6 @@ pub(super) fn top(answer: &Json) -> String {
         text(&messages["refused"]),
         table(&lines, 3)
     )
-}
-
-/// The last changes of the decision.
-pub(super) fn why(answer: &Json) -> String {
-    let decisions = answer.as_array().map(Vec::as_slice).unwrap_or_default();
-    if decisions.is_empty() {
-        return "nothing was decided yet".to_owned();
-    }
-    let mut out = String::new();
-    for decision in decisions {
-        let number = |key: &str| decision[key].as_f64().unwrap_or(0.0);
-        let weights = decision["weights"].as_object().into_iter().flatten();
-        let weights: Vec<String> = weights.map(|(agent, weight)| format!("{agent} {weight}")).collect();
-        let _ = writeln!(
-            out,
-            "{:9.2} s  {} → {}: {} has the say ({}), because danger is {:.2} and desire {:.2}",
-            number("time_s"),
-            text(&decision["before"]),
-            text(&decision["situation"]),
-            text(&decision["active"]),
-            weights.join(", "),
-            number("danger"),
-            number("desire"),
-        );
-    }
-    out
 }
 
 /// A message with when it was sent and by whom.

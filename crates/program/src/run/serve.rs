@@ -1,6 +1,5 @@
 //! What a run does for those who control it from another process.
 
-use std::collections::VecDeque;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, PoisonError};
 use std::thread::JoinHandle;
@@ -12,18 +11,19 @@ use hardware::Latch;
 use hardware::latch::Cause;
 use record::{dynamic, schema::Schema};
 use runtime::{
-    AgentPlan, Control, Overload, Plan, QueuePlan, Refusal, Registry, Request, RunFolder, WirePlan,
+    AgentPlan, Control, Overload, Plan, QueuePlan, Refusal, Registry, Request, RunFolder, Tap, WirePlan,
 };
-use serde_json::{Value as Json, json};
+use serde_json::Value as Json;
+use types::Time;
 use types::definition::Definition;
 use types::message::Message as _;
-use types::messages::Decision;
+use types::messages::{Decision, Orders, Reasons};
 use types::value::Entry;
-use types::{Time, cdr};
 
 use super::asked::{Asked, Deed};
 use super::prepare::Ready;
 use crate::cli::ClockChoice;
+use crate::live::why::{self, Changes};
 use crate::terminal;
 
 /// The control interface of a run, while it lasts.
@@ -48,7 +48,7 @@ pub(crate) fn start(ready: &Ready, control: &Control, asked: &Asked, clock: Cloc
         Ok(folder) => folder,
         Err(error) => return warn(error.to_string()),
     };
-    let decisions = Arc::new(Mutex::new(VecDeque::new()));
+    let decisions = Arc::new(Mutex::new(Changes::new(KEPT)));
     let decider =
         ready.plan.agents.iter().find(|agent| agent.kind == DECIDER).map(|agent| agent.name.clone());
     let hooks = RunHooks {
@@ -84,7 +84,7 @@ impl Drop for Serving {
 /// The type of agent that decides.
 pub(super) const DECIDER: &str = "decision-maker";
 
-type Decisions = Arc<Mutex<VecDeque<(Time, Decision)>>>;
+type Decisions = Arc<Mutex<Changes>>;
 
 /// Keeps the changes of the decision.
 fn listen(
@@ -95,12 +95,19 @@ fn listen(
 ) -> Option<JoinHandle<()>> {
     let work = move || {
         let Ok(tap) = control.tap(&format!("{decider}.decision")) else { return };
+        let reasons = control.tap(&format!("{decider}.reasons")).ok();
+        let orders = control.tap(&format!("{decider}.orders")).ok();
         while !over.load(Ordering::Acquire) {
-            for heard in tap.take().0 {
-                if let Some(decision) = decoded(&heard.cdr) {
-                    keep(&decisions, heard.header.stamp, decision);
-                }
+            // Reasons are sent before their decision: those of what is taken here are there when they are taken behind it.
+            let decided = tap.take().0;
+            let told = |tap: &Option<Tap>| tap.as_ref().map(|tap| tap.take().0).unwrap_or_default();
+            let heard =
+                [(Reasons::NAME, told(&reasons)), (Decision::NAME, decided), (Orders::NAME, told(&orders))];
+            let mut changes = decisions.lock().unwrap_or_else(PoisonError::into_inner);
+            for (definition, messages) in heard {
+                messages.iter().for_each(|heard| changes.hear(definition, heard.header.stamp, &heard.cdr));
             }
+            drop(changes);
             std::thread::park_timeout(FETCH);
         }
     };
@@ -109,19 +116,7 @@ fn listen(
 
 /// A decision from its bytes.
 pub(super) fn decoded(bytes: &[u8]) -> Option<Decision> {
-    Decision::decode(&mut cdr::Reader::new(bytes).ok()?, &mut Vec::new()).ok()
-}
-
-fn keep(decisions: &Decisions, time: Time, decision: Decision) {
-    let mut decisions = decisions.lock().unwrap_or_else(PoisonError::into_inner);
-    let same = |last: &Decision| last.situation == decision.situation && last.active == decision.active;
-    if decisions.back().is_some_and(|(_, last)| same(last)) {
-        return;
-    }
-    if decisions.len() == KEPT {
-        decisions.pop_front();
-    }
-    decisions.push_back((time, decision));
+    why::decoded(bytes)
 }
 
 struct RunHooks {
@@ -197,21 +192,7 @@ impl Hooks for RunHooks {
                 .help("a decision maker has the type \"decision-maker\""));
         }
         let decisions = self.decisions.lock().unwrap_or_else(PoisonError::into_inner);
-        let last = decisions.iter().skip(decisions.len().saturating_sub(n));
-        let rows = last.map(|(time, decision)| {
-            let weights =
-                decision.rows.iter().map(|row| (row.agent.as_str().to_owned(), Json::from(row.weight)));
-            json!({
-                "time_s": time.seconds(),
-                "situation": decision.situation.as_str(),
-                "before": decision.before.as_str(),
-                "active": decision.active.as_str(),
-                "danger": decision.danger,
-                "desire": decision.desire,
-                "weights": weights.collect::<serde_json::Map<_, _>>(),
-            })
-        });
-        Ok(rows.collect::<Vec<_>>().into())
+        Ok(decisions.last(n).into())
     }
 
     fn decode(&self, definition: &Definition, cdr: &[u8]) -> Result<Json, String> {

@@ -82,6 +82,28 @@ fn what_the_file_says_is_in_the_plan() {
 }
 
 #[test]
+fn a_table_of_decisions_with_conditions_survives_whichever_way_its_keys_are_written() {
+    let text = r#"
+        name = "deciding"
+        agent.safety = { is = "safety-monitor", on = "ranges" }
+        agent.decision = { is = "decision-maker", on = "safety", signals = ["faces"] }
+        wires."safety.safety" = "decision.safety"
+        [decide]
+        battery.low = { when = "battery < 0.2", until = "battery > 0.3", priority = 60, goal = "charge", safety = 0.0 }
+        "crowd" = { when = 'faces > 3 && !(nearest < 1.5)', safety = { active = false } }
+        target.seen = { goal = "follow", safety = { weight = 1.0, importance = 1, rate = 0.5, active = true, method = "exact" } }
+        "free" = { safety = { rate = 0.25 } }
+    "#;
+    let plan = read_plan(text, "deciding.toml", &registry()).unwrap_or_else(|mistakes| panic!("{mistakes}"));
+    let table = plan.agent("decision").unwrap().params.get("table").unwrap().value.as_table().unwrap();
+    let keys: Vec<&str> = table.rows().iter().map(|row| row.key.as_str()).collect();
+    assert_eq!(keys, ["battery.low", "crowd", "target.seen", "free"]);
+    assert_eq!(table.at_path("crowd.when").unwrap().value, Value::from("faces > 3 && !(nearest < 1.5)"));
+    assert_eq!(table.at_path("\"target.seen\".safety.rate").unwrap().value, Value::Float(0.5));
+    assert_eq!(again(&plan), bare(plan));
+}
+
+#[test]
 fn a_queue_is_read_with_the_wires_to_it_and_from_it() {
     let text = r#"
         name = "shared"

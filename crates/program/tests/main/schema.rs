@@ -30,6 +30,12 @@ fn it_agrees_with_every_scenario() {
     let wire = |recipient| format!("wires.\"a.b\" = {{ to = \"c.d\", every = 2, recipient = {recipient} }}");
     assert_eq!(said(&wire("\"c\"")), None);
     assert!(said(&wire("3")).is_some_and(|error| error.contains("recipient")));
+    let decide = |row| format!("decide.\"battery.low\" = {{ when = \"battery < 0.2\", {row} }}");
+    assert_eq!(said(&decide("goal = \"charge\", wall = { rate = 0.5, active = true }")), None);
+    assert_eq!(said("decide.battery.low = { when = \"battery < 0.2\", wall = 0.5 }"), None);
+    for wrong in ["priority = 0.5", "wall = 2.0", "wall = { rate = 0 }", "wall = { wieght = 1.0 }"] {
+        assert!(said(&decide(wrong)).is_some(), "{wrong}");
+    }
 }
 
 #[test]
