@@ -8,7 +8,7 @@ use record::log::{Message as Logged, ReadError, Reader};
 use serde_json::{Map, Value as Json, json};
 use types::message::Message;
 use types::messages::{Decision, Order, Orders, Reasons};
-use types::{Header, Time, cdr};
+use types::{Header, Name, Time, cdr};
 
 /// A decision that differs from the one before.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -142,6 +142,10 @@ impl Change {
             };
             changed.insert("began".into(), json!(named(|was, is| is && !was)));
             changed.insert("ended".into(), json!(named(|was, is| was && !is)));
+        }
+        if before.is_none_or(|before| before.decision.situation != self.decision.situation) {
+            let named = [self.decision.before, self.decision.situation];
+            changed.insert("situation".into(), json!(named.each_ref().map(Name::as_str)));
         }
         let Some(before) = before else { return changed.into() };
         let goals = [&before.decision, &self.decision].map(|decision| word(decision.goal.as_str()));

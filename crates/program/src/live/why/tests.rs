@@ -1,5 +1,4 @@
 use record::log::{RunInfo, Writer};
-use types::Name;
 use types::message::describe;
 use types::messages::{Activity, Held, Reason, Row};
 
@@ -131,6 +130,18 @@ fn two_steps_at_one_instant_keep_their_own_reasons() {
     let battery =
         changes.last(10).iter().map(|change| change["values"]["battery"].as_f64()).collect::<Vec<_>>();
     assert_eq!(battery, [Some(0.5), Some(0.125)]);
+}
+
+#[test]
+fn a_change_within_a_situation_is_told_as_that() {
+    let mut changes = Changes::new(8);
+    for (number, weight) in [(1, 1.0), (2, 0.5)] {
+        let decision = decision("free", "blind", &[("wall", weight, "free")]);
+        changes.hear(Decision::NAME, &header(1.0, number), &bytes(&decision));
+    }
+    let told = because::why(&changes.last(10).into());
+    let heads: Vec<&str> = told.lines().filter(|line| line.contains(" s  ")).map(str::trim).collect();
+    assert_eq!(heads, ["1.00 s  blind → free: wall has the say", "1.00 s  still free: wall has the say"]);
 }
 
 #[test]
