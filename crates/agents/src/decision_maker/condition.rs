@@ -111,8 +111,8 @@ impl Two {
             Two::Subtract => a - b,
             Two::Multiply => a * b,
             Two::Divide => a / b,
-            // The lesser of what is known and what is not is unknown, other than `f64::min` has it.
-            Two::Min | Two::Max if a.is_nan() || b.is_nan() => f64::NAN,
+            // Other than `f64::min` and `!=` have it, nothing is known of these where one is not.
+            Two::Min | Two::Max | Two::Unequal if a.is_nan() || b.is_nan() => f64::NAN,
             Two::Min => a.min(b),
             Two::Max => a.max(b),
             Two::Less => of_truth(a < b),
@@ -120,8 +120,7 @@ impl Two {
             Two::Greater => of_truth(a > b),
             Two::GreaterOrEqual => of_truth(a >= b),
             Two::Equal => of_truth(a == b),
-            // Neither equal nor unequal to what is unknown.
-            Two::Unequal => of_truth(a < b || a > b),
+            Two::Unequal => of_truth(a != b),
             Two::And => of_truth(is_true(a) && is_true(b)),
             Two::Or => of_truth(is_true(a) || is_true(b)),
         }

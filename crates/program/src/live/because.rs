@@ -21,10 +21,13 @@ fn change(change: &Json) -> String {
         None | Some("") => "nobody has the say".to_owned(),
         Some(agent) => format!("{agent} has the say"),
     };
-    let time = change["time_s"].as_f64().unwrap_or(0.0);
-    let mut out =
-        format!("{time:9.2} s  {whose}{} → {}: {say}\n", text(&change["before"]), text(&change["situation"]));
-    let changed = &change["changed"];
+    let (time, changed) = (change["time_s"].as_f64().unwrap_or(0.0), &change["changed"]);
+    let situation = text(&change["situation"]);
+    let situation = match changed["situation"].is_null() {
+        true => format!("still {situation}"),
+        false => format!("{} → {situation}", text(&change["before"])),
+    };
+    let mut out = format!("{time:9.2} s  {whose}{situation}: {say}\n");
     line(&mut out, "began", list(&changed["began"]));
     line(&mut out, "ended", list(&changed["ended"]));
     line(&mut out, "active", list(&change["situations"]));

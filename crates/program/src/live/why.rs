@@ -6,15 +6,16 @@ use std::path::Path;
 use agents::decision_maker::is_truth;
 use record::log::{Message as Logged, ReadError, Reader};
 use serde_json::{Map, Value as Json, json};
-use types::Time;
-use types::cdr;
 use types::message::Message;
 use types::messages::{Decision, Order, Orders, Reasons};
+use types::{Header, Name, Time, cdr};
 
 /// A decision that differs from the one before.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 struct Change {
     time: Time,
+    /// Decisions and reasons of one step have one number: at one instant there can be two steps.
+    number: u64,
     decision: Decision,
     reasons: Option<Reasons>,
     orders: Option<Orders>,
@@ -29,7 +30,7 @@ pub(crate) struct Changes {
     /// The last decision, whether it was a change or not.
     last: Option<Decision>,
     /// Those whose decision was not heard yet.
-    reasons: VecDeque<(Time, Reasons)>,
+    reasons: VecDeque<(Header, Reasons)>,
     orders: Option<(Time, Orders)>,
 }
 
@@ -43,19 +44,22 @@ impl Changes {
     }
 
     /// Takes a message of a decision maker, of whatever output.
-    pub(crate) fn hear(&mut self, definition: &str, time: Time, bytes: &[u8]) {
+    pub(crate) fn hear(&mut self, definition: &str, header: &Header, bytes: &[u8]) {
         match definition {
-            Decision::NAME => self.decided(time, decoded(bytes)),
-            Reasons::NAME => self.explained(time, decoded(bytes)),
-            Orders::NAME => self.ordered(time, decoded(bytes)),
+            Decision::NAME => self.decided(header, decoded(bytes)),
+            Reasons::NAME => self.explained(header, decoded(bytes)),
+            Orders::NAME => self.ordered(header.stamp, decoded(bytes)),
             _ => {}
         }
     }
 
-    fn decided(&mut self, time: Time, decision: Option<Decision>) {
+    fn decided(&mut self, header: &Header, decision: Option<Decision>) {
         let Some(decision) = decision else { return };
-        self.reasons.retain(|(at, _)| *at >= time);
-        let reasons = self.reasons.iter().find(|(at, _)| *at == time).map(|(_, reasons)| *reasons);
+        let (time, number) = (header.stamp, header.sequence);
+        self.reasons.retain(|(known, _)| known.stamp >= time);
+        let of_step = |known: &Header| known.stamp == time && known.sequence == number;
+        let own = self.reasons.iter().position(|(known, _)| of_step(known));
+        let reasons = own.and_then(|own| self.reasons.remove(own)).map(|(_, reasons)| reasons);
         let moved = reasons.is_some_and(|reasons| reasons.situations.iter().any(|held| held.was != held.is));
         let said = |decision: &Decision| Decision { danger: 0.0, desire: 0.0, ..*decision };
         if moved || self.last.as_ref().map(said) != Some(said(&decision)) {
@@ -63,29 +67,33 @@ impl Changes {
                 self.kept.pop_front();
             }
             let orders = self.orders.filter(|(at, _)| *at <= time).map(|(_, orders)| orders);
-            self.kept.push_back(Change { time, decision, reasons, orders });
+            self.kept.push_back(Change { time, number, decision, reasons, orders });
         }
         self.last = Some(decision);
     }
 
-    fn explained(&mut self, time: Time, reasons: Option<Reasons>) {
+    fn explained(&mut self, header: &Header, reasons: Option<Reasons>) {
         let Some(reasons) = reasons else { return };
-        match self.kept.back_mut().filter(|change| change.time == time) {
+        let of_step = |change: &&mut Change| change.time == header.stamp && change.number == header.sequence;
+        match self.kept.iter_mut().rev().find(of_step) {
             Some(change) => change.reasons = Some(reasons),
             None => {
                 if self.reasons.len() == WAITING {
                     self.reasons.pop_front();
                 }
-                self.reasons.push_back((time, reasons));
+                self.reasons.push_back((*header, reasons));
             }
         }
     }
 
     fn ordered(&mut self, time: Time, orders: Option<Orders>) {
         let Some(orders) = orders else { return };
-        // They are sent behind the decision of the same step.
-        if let Some(change) = self.kept.back_mut().filter(|change| change.time == time) {
+        // They are sent behind the decision of their step, and may be heard behind later ones.
+        for change in self.kept.iter_mut().rev().take_while(|change| change.time >= time) {
             change.orders = Some(orders);
+            if change.time == time {
+                break;
+            }
         }
         self.orders = Some((time, orders));
     }
@@ -100,7 +108,7 @@ impl Changes {
 
 impl Change {
     fn to_json(self, before: Option<&Change>) -> Json {
-        let Change { time, decision, reasons, orders } = self;
+        let Change { time, decision, reasons, orders, .. } = self;
         let active = reasons.map(|reasons| {
             let active = reasons.situations.iter().filter(|held| held.is);
             active.map(|held| held.situation.as_str().to_owned()).collect::<Vec<_>>()
@@ -134,6 +142,10 @@ impl Change {
             };
             changed.insert("began".into(), json!(named(|was, is| is && !was)));
             changed.insert("ended".into(), json!(named(|was, is| was && !is)));
+        }
+        if before.is_none_or(|before| before.decision.situation != self.decision.situation) {
+            let named = [self.decision.before, self.decision.situation];
+            changed.insert("situation".into(), json!(named.each_ref().map(Name::as_str)));
         }
         let Some(before) = before else { return changed.into() };
         let goals = [&before.decision, &self.decision].map(|decision| word(decision.goal.as_str()));
@@ -214,7 +226,8 @@ pub(crate) fn of_log(path: &Path, n: usize) -> Result<Json, ReadError> {
             makers.push((agent.to_owned(), Changes::new(n)));
             makers.len() - 1
         });
-        makers[at].1.hear(&message.channel.definition, message.time, &message.cdr);
+        let header = message.header.unwrap_or(Header { stamp: message.time, ..Header::default() });
+        makers[at].1.hear(&message.channel.definition, &header, &message.cdr);
     }
     let several = makers.len() > 1;
     let mut all = Vec::new();

@@ -105,7 +105,7 @@ fn listen(
                 [(Reasons::NAME, told(&reasons)), (Decision::NAME, decided), (Orders::NAME, told(&orders))];
             let mut changes = decisions.lock().unwrap_or_else(PoisonError::into_inner);
             for (definition, messages) in heard {
-                messages.iter().for_each(|heard| changes.hear(definition, heard.header.stamp, &heard.cdr));
+                messages.iter().for_each(|heard| changes.hear(definition, &heard.header, &heard.cdr));
             }
             drop(changes);
             std::thread::park_timeout(FETCH);

@@ -273,7 +273,8 @@ fn no_situation(row: &Row) -> Mistake {
 fn placed(mistake: Mistake, text: &str, at: Span) -> Mistake {
     let quotes = (at.end - at.start).checked_sub(text.len() as u32);
     let at = match quotes {
-        Some(quotes @ (0 | 2)) => {
+        // None, one before and behind, or three.
+        Some(quotes @ (0 | 2 | 6)) => {
             let start = at.start + quotes / 2;
             Span { start: start + mistake.at.start, end: start + mistake.at.end }
         }

@@ -1,5 +1,4 @@
 use record::log::{RunInfo, Writer};
-use types::Name;
 use types::message::describe;
 use types::messages::{Activity, Held, Reason, Row};
 
@@ -61,13 +60,17 @@ fn bytes<T: Message>(message: &T) -> Vec<u8> {
     out.bytes().to_vec()
 }
 
+fn header(seconds: f64, sequence: u64) -> Header {
+    Header { stamp: Time::from_seconds(seconds), sequence, ..Header::default() }
+}
+
 fn changes() -> Changes {
     let mut changes = Changes::new(8);
-    for (time, decision, reasons, orders) in steps() {
-        let time = Time::from_seconds(time);
-        changes.hear(Reasons::NAME, time, &bytes(&reasons));
-        changes.hear(Decision::NAME, time, &bytes(&decision));
-        orders.iter().for_each(|orders| changes.hear(Orders::NAME, time, &bytes(orders)));
+    for (number, (time, decision, reasons, orders)) in steps().into_iter().enumerate() {
+        let header = header(time, number as u64);
+        changes.hear(Reasons::NAME, &header, &bytes(&reasons));
+        changes.hear(Decision::NAME, &header, &bytes(&decision));
+        orders.iter().for_each(|orders| changes.hear(Orders::NAME, &header, &bytes(orders)));
     }
     changes
 }
@@ -101,14 +104,44 @@ fn the_last_changes_are_told_with_what_is_new_in_them() {
 #[test]
 fn messages_of_one_step_belong_together_in_whatever_order_they_come() {
     let expected = changes().last(10);
-    let mut changes = Changes::new(8);
-    for (time, decision, reasons, orders) in steps() {
-        let time = Time::from_seconds(time);
-        changes.hear(Decision::NAME, time, &bytes(&decision));
-        orders.iter().for_each(|orders| changes.hear(Orders::NAME, time, &bytes(orders)));
-        changes.hear(Reasons::NAME, time, &bytes(&reasons));
+    let steps = || steps().into_iter().enumerate();
+    let mut later = Changes::new(8);
+    for (number, (time, decision, ..)) in steps() {
+        later.hear(Decision::NAME, &header(time, number as u64), &bytes(&decision));
     }
-    assert_eq!(changes.last(10), expected);
+    for (number, (time, _, reasons, orders)) in steps() {
+        let header = header(time, number as u64);
+        orders.iter().for_each(|orders| later.hear(Orders::NAME, &header, &bytes(orders)));
+        later.hear(Reasons::NAME, &header, &bytes(&reasons));
+    }
+    assert_eq!(later.last(10), expected);
+}
+
+#[test]
+fn two_steps_at_one_instant_keep_their_own_reasons() {
+    let mut changes = Changes::new(8);
+    let all = steps();
+    for number in [0, 2] {
+        changes.hear(Reasons::NAME, &header(1.0, number), &bytes(&all[number as usize].2));
+    }
+    for number in [0, 2] {
+        changes.hear(Decision::NAME, &header(1.0, number), &bytes(&all[number as usize].1));
+    }
+    let battery =
+        changes.last(10).iter().map(|change| change["values"]["battery"].as_f64()).collect::<Vec<_>>();
+    assert_eq!(battery, [Some(0.5), Some(0.125)]);
+}
+
+#[test]
+fn a_change_within_a_situation_is_told_as_that() {
+    let mut changes = Changes::new(8);
+    for (number, weight) in [(1, 1.0), (2, 0.5)] {
+        let decision = decision("free", "blind", &[("wall", weight, "free")]);
+        changes.hear(Decision::NAME, &header(1.0, number), &bytes(&decision));
+    }
+    let told = because::why(&changes.last(10).into());
+    let heads: Vec<&str> = told.lines().filter(|line| line.contains(" s  ")).map(str::trim).collect();
+    assert_eq!(heads, ["1.00 s  blind → free: wall has the say", "1.00 s  still free: wall has the say"]);
 }
 
 #[test]
@@ -116,7 +149,7 @@ fn only_the_last_are_kept_and_what_they_change_is_known() {
     let mut changes = Changes::new(2);
     for i in 0..10 {
         let decision = decision("free", "blind", &[("wall", f64::from(i) / 16.0, "free")]);
-        changes.hear(Decision::NAME, Time(i64::from(i)), &bytes(&decision));
+        changes.hear(Decision::NAME, &header(f64::from(i), i as u64), &bytes(&decision));
     }
     let last = changes.last(10);
     assert_eq!(last.len(), 2);
@@ -135,12 +168,11 @@ fn a_log_says_the_same_as_the_run_did() {
         ("/decision/orders", describe::<Orders>()),
     ];
     let channels = topics.map(|(topic, definition)| log.channel(topic, &definition).unwrap());
-    for (time, decision, reasons, orders) in steps() {
-        let stamp = Time::from_seconds(time);
+    for (number, (time, decision, reasons, orders)) in steps().into_iter().enumerate() {
+        let header = header(time, number as u64);
         let messages = [Some(bytes(&reasons)), Some(bytes(&decision)), orders.map(|orders| bytes(&orders))];
         for (channel, message) in channels.iter().zip(messages) {
-            let header = types::Header { stamp, ..types::Header::default() };
-            message.iter().for_each(|message| log.write(*channel, &header, stamp, message).unwrap());
+            message.iter().for_each(|message| log.write(*channel, &header, header.stamp, message).unwrap());
         }
     }
     log.finish().unwrap();
