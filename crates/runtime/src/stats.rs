@@ -159,14 +159,16 @@ pub(crate) struct Window {
     begun: Option<Time>,
     /// How many steps there had been when it was made.
     earlier: u64,
+    /// Whether the next steps that are seen do not count: the first of them began before.
+    passes_over: bool,
 }
 
 impl Window {
-    /// One that begins now.
+    /// One that begins with the first step from now on, not with one that is under way.
     pub(crate) fn of(stats: &AgentStats) -> Window {
         let counts = stats.exec_counts();
         let earlier = counts.iter().sum();
-        Window { before: counts.clone(), this: counts, begun: None, earlier }
+        Window { before: counts.clone(), this: counts, begun: None, earlier, passes_over: true }
     }
 
     /// How many steps there were since it was made.
@@ -182,6 +184,9 @@ impl Window {
     /// How many steps there were, and the longest of them, to an eighth of a doubling.
     pub(crate) fn look(&mut self, stats: &AgentStats, now: Time, span: Duration) -> (u64, Duration) {
         let counts = stats.exec_counts();
+        if self.passes_over && self.steps(stats) > 0 {
+            *self = Window { passes_over: false, ..Window::of(stats) };
+        }
         let begun = *self.begun.get_or_insert(now);
         if now - begun >= span {
             self.before = core::mem::replace(&mut self.this, counts);
@@ -340,6 +345,20 @@ mod tests {
         assert_eq!(steps, 1, "the two before the span before this one are forgotten");
         assert!((1_000_000..=1_125_000).contains(&longest.0), "{longest}");
         assert_eq!(window.look(&stats, at(8), Duration::secs(2)), (0, Duration::ZERO));
+    }
+
+    #[test]
+    fn a_step_that_was_under_way_when_a_window_began_does_not_count() {
+        let stats = AgentStats::default();
+        let at = |millis: i64| Time::ZERO + Duration::millis(millis);
+        let look = |window: &mut Window, millis| window.look(&stats, at(millis), Duration::secs(1));
+        let mut window = Window::of(&stats);
+        assert_eq!(look(&mut window, 0).0, 0);
+        stats.exec.add(9_000_000);
+        assert_eq!(look(&mut window, 100).0, 0, "it began before");
+        stats.exec.add(1_000_000);
+        assert_eq!(look(&mut window, 200).0, 1);
+        assert!(look(&mut window, 300).1 < Duration::millis(2));
     }
 
     proptest::proptest! {

@@ -212,7 +212,8 @@ fn given(agent: &Resident, setting: &Setting, overhead: Duration) -> Option<Give
     let period = time.filter(|_| is_periodic);
     // At its nominal rate nothing holds it back.
     let gap = time.filter(|_| !is_periodic).map(|gap| match model::nominal_gap(agent) {
-        Some(usual) if gap <= usual => nominal.min_gap,
+        // A hair more than that is rounding.
+        Some(usual) if gap.0 <= usual.0 + usual.0 / 1000 => nominal.min_gap,
         _ => gap,
     });
     let method = agent.methods.get(setting.method).map(|method| method.name);

@@ -182,7 +182,7 @@ impl Router {
         for (agent, longest, admitted) in grown {
             let millis = |span: Duration| format!("{:.3} ms", span.0 as f64 * 1e-6);
             let what =
-                format!("its step took {}, and it was admitted with {}", millis(longest), millis(admitted));
+                format!("took {} for a step, and was admitted with {}", millis(longest), millis(admitted));
             self.incidents.push(Incident { time: now, agent, what });
         }
     }

@@ -312,5 +312,5 @@ fn who_outgrows_what_it_was_admitted_with_is_told_at_once() {
         Options { processors: Some(1), admission, limit: Some(Duration::secs(1)), ..Options::default() };
     let report = run(plan, options, &[(500, "fault worker heavy")]);
     let told: Vec<&str> = said(&report).into_iter().filter(|what| what.contains("admitted with")).collect();
-    assert_eq!(told, ["its step took 6.000 ms, and it was admitted with 2.000 ms"]);
+    assert_eq!(told, ["took 6.000 ms for a step, and was admitted with 2.000 ms"]);
 }
