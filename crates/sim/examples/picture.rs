@@ -27,8 +27,9 @@ fn main() -> Result<(), Box<dyn Error>> {
     let vary = Vary::read(&vary, &mut mistakes).ok_or("the draws have mistakes")?;
     let mut robots = Table::new();
     robots.set("h1", types::value::Value::Table(Table::new()));
-    let drawn =
-        vary.draw(&world, &robots, &["room", "corridor", "hall"], seed).map_err(|all| format!("{all:?}"))?;
+    let regions = sim::WorldPlan::read(&world, &mut mistakes).ok_or("the world has mistakes")?.regions;
+    let through: Vec<&str> = regions.iter().map(|region| region.name.as_str()).collect();
+    let drawn = vary.draw(&world, &robots, &through, seed).map_err(|all| format!("{all:?}"))?;
     let mut simulator = Simulator::new(&drawn.plan, seed);
     let id = simulator.add_robot("h1", Model::h1(), drawn.starts[0].1)?;
     let out = Path::new(&out);
@@ -40,6 +41,13 @@ fn main() -> Result<(), Box<dyn Error>> {
         simulator.put(id, Pose { heading: start.heading + turn, ..start })?;
         view(&simulator, id, &out.join(format!("{name}.png")))?;
     }
+    // Whoever stands there is seen from before.
+    for person in drawn.plan.people.iter().filter(|person| person.appears.is_none()) {
+        let before = person.at + Point::polar(1.6, person.facing);
+        simulator.put(id, Pose::new(before.x, before.y, (person.at - before).bearing()))?;
+        view(&simulator, id, &out.join(format!("{}.png", person.name)))?;
+    }
+    simulator.put(id, start)?;
     if let Some((min, max)) = far {
         let middle = (min + max) * 0.5;
         let guide = drawn.plan.people.iter().find(|person| person.name == "guide").ok_or("no guide")?;
