@@ -37,7 +37,7 @@ pub struct ResourceParams {
     /// How often other processes are thought to work that have a real-time priority (time). 10 ms: what the kernel tells is their share alone.
     #[param(default = Duration::millis(10), min = 0.0001, max = 10.0)]
     pub burden_period: Duration,
-    /// How long what a suspended agent took last is taken for what it would take now (time). After 5 s it is tried again.
+    /// How long what a suspended agent took last is taken for what it would take now (time). After 5 s it is tried again, and after twice as long each time that it takes as long still.
     #[param(default = Duration::secs(5), min = 0.1, max = 3600.0)]
     pub believes: Duration,
     /// Memory that this process may use (MB); 0 for any. What is more is told.

@@ -15,8 +15,31 @@ const ABOVE_ALL: u8 = 100;
 /// What is remembered of each agent.
 #[derive(Debug, Default)]
 pub(super) struct Model {
-    /// By how much steps take longer than is declared, and when that was seen last.
-    seen: Vec<(f64, Option<Time>)>,
+    seen: Vec<Seen>,
+}
+
+/// How long the steps of an agent were seen to take.
+#[derive(Clone, Copy, Debug)]
+struct Seen {
+    /// By how much longer than is declared.
+    times: f64,
+    /// When that was seen last.
+    at: Option<Time>,
+    /// For how many times as long as usual it is believed: twice as long after each time that it was found to be so still.
+    patience: i64,
+    /// Whether it was believed no more, and what it takes now is not seen yet.
+    is_tried: bool,
+}
+
+/// An agent that is suspended is tried again no less often than after so many times the usual span.
+const MOST_PATIENCE: i64 = 16;
+/// What takes so much longer than is declared is found to be so still.
+const STILL: f64 = 1.25;
+
+impl Default for Seen {
+    fn default() -> Seen {
+        Seen { times: 1.0, at: None, patience: 1, is_tried: false }
+    }
 }
 
 impl Model {
@@ -29,11 +52,11 @@ impl Model {
         now: Time,
     ) -> System {
         let mut system = census.system.clone();
-        self.seen.resize(census.residents.len(), (1.0, None));
+        self.seen.resize(census.residents.len(), Seen::default());
         let residents = census.residents.iter().zip(&mut self.seen);
         for (agent, (resident, seen)) in system.agents.iter_mut().zip(residents) {
             look(resident, seen, census.percent, now, params.believes);
-            agent.cost = exact(cost_of(resident, 0, seen.0) + census.overhead);
+            agent.cost = exact(cost_of(resident, 0, seen.times) + census.overhead);
         }
         for burden in &host.burdens {
             let priority = Some(if burden.priority == 0 { ABOVE_ALL } else { burden.priority });
@@ -61,14 +84,14 @@ impl Model {
                 if resident.is_robot || name == own || resident.nominal.giving.is_rigid {
                     return Managed::rigid();
                 }
-                managed(resident, order, self.seen[at].0, census.overhead)
+                managed(resident, order, self.seen[at].times, census.overhead)
             })
             .collect()
     }
 }
 
 /// What steps took of late beside what is declared for them. Where there were none, what was seen last is believed for some time.
-fn look(resident: &Resident, seen: &mut (f64, Option<Time>), percent: i64, now: Time, believes: Duration) {
+fn look(resident: &Resident, seen: &mut Seen, percent: i64, now: Time, believes: Duration) {
     let (steps, longest) = resident.recent;
     let declared = resident.plan.cost_of_step(resident.methods).unwrap_or(Duration::ZERO);
     if steps > 0 && declared > Duration::ZERO {
@@ -76,9 +99,15 @@ fn look(resident: &Resident, seen: &mut (f64, Option<Time>), percent: i64, now: 
         let free = resident.plan.budget.unwrap_or(Duration::ZERO);
         let over = if free > Duration::ZERO { longest - free + declared } else { longest };
         let taken = Duration(over.0 * percent / 100);
-        *seen = ((taken.0 as f64 / declared.0 as f64).max(1.0), Some(now));
-    } else if seen.1.is_none_or(|at| now - at > believes) {
-        *seen = (1.0, None);
+        let times = (taken.0 as f64 / declared.0 as f64).max(1.0);
+        let patience = match (seen.is_tried, times >= STILL) {
+            (true, true) => (seen.patience * 2).min(MOST_PATIENCE),
+            (_, false) => 1,
+            (false, true) => seen.patience,
+        };
+        *seen = Seen { times, at: Some(now), patience, is_tried: false };
+    } else if seen.at.is_some_and(|at| now - at > believes * seen.patience) {
+        *seen = Seen { times: 1.0, at: None, is_tried: true, ..*seen };
     }
 }
 

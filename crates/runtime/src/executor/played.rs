@@ -20,6 +20,12 @@ impl Core {
         let Some(since) = &mut self.ready_since else { return };
         since.resize(slots, Time::NEVER);
         for (slot, since) in since.iter_mut().enumerate() {
+            let seat = self.seats[slot].as_deref();
+            if seat.is_some_and(|seat| !seat.timing.means.is_active) {
+                // What came for one that is suspended is released when it goes on.
+                *since = Time::NEVER;
+                continue;
+            }
             if *since == Time::NEVER && self.ready.is_marked(slot as u32) {
                 *since = now;
             }

@@ -229,6 +229,9 @@ fn who_is_suspended_makes_no_step_and_goes_on_with_what_came() {
     // 0, then 20 and 40 at 50, then 60 and 80.
     assert_eq!(ear.counts.releases, 4);
     assert_eq!(report.view.wires[0].taken, 5, "and nothing was lost");
+    let played = Options { processors: Some(1), ..Options::default() };
+    let report = run(team(), played, &requests);
+    assert_eq!(report.view.agents[1].response.max, 0.0, "what waited was released when it went on");
     let report = run(team(), Options::default(), &[(10, "set ear suspended true")]);
     assert!(report.view.agents[1].is_suspended);
     assert_eq!(report.view.agents[1].counts.releases, 1);

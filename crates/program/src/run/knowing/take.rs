@@ -21,6 +21,10 @@ pub(super) fn take(
 ) -> Result<Known, Failure> {
     let file = &scenario.file;
     let failed = |error: KnowledgeError| of_store(file, section, &error);
+    if let Some(folder) = store.parent() {
+        // Where it cannot be made, the store says what is wrong.
+        let _ = std::fs::create_dir_all(folder);
+    }
     let mut knowledge = Knowledge::open(store).map_err(failed)?;
     let mut known = {
         let now = knowledge.read().map_err(failed)?;
