@@ -121,8 +121,10 @@ pub struct Robot {
     #[port(rows = 64)]
     transforms: Output<Transforms>,
     /// How to drive.
+    #[port(single)]
     drive: Input<Twist>,
     /// Where to turn the head.
+    #[port(single)]
     head_to: Input<Head>,
     /// How fast is safe, past all who command. Once wired, its silence forbids to move forward.
     safety: Input<Safety>,

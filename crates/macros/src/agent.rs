@@ -39,6 +39,10 @@ fn options(field: &Field, runtime: &proc_macro2::TokenStream) -> syn::Result<pro
             sets.push(quote!(robot: ::core::option::Option::Some(#port)));
         } else if attribute.path().is_ident("port") {
             attribute.parse_nested_meta(|meta| {
+                if meta.path.is_ident("single") {
+                    sets.push(quote!(single: true));
+                    return Ok(());
+                }
                 for known in ["history", "rows", "priorities"] {
                     if meta.path.is_ident(known) {
                         let id = format_ident!("{known}");
@@ -47,7 +51,7 @@ fn options(field: &Field, runtime: &proc_macro2::TokenStream) -> syn::Result<pro
                         return Ok(());
                     }
                 }
-                Err(meta.error("a port has `history`, `rows` or `priorities`"))
+                Err(meta.error("a port has `history`, `rows`, `priorities` or `single`"))
             })?;
         }
     }

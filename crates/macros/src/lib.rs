@@ -16,8 +16,12 @@ use proc_macro::TokenStream;
 /// * A field of type `Router` is the agent's end at the router; one is enough, and no wire leads to it.
 /// * `#[robot("drive")]` on a port wires it to that port of the robot which the system file names for the agent.
 /// * `#[port(history = 16)]` on an output keeps its last messages in memory; `#[port(rows = 4096)]` is the greatest length of
-///   the row of a large message; `#[port(priorities = "urgent, normal")]` names the priorities that it uses.
+///   the row of a large message; `#[port(priorities = "urgent, normal")]` names the priorities that it uses;
+///   `#[port(single)]` on an input lets one sender at most be wired to it.
 /// * `#[agent(kind = "wall-follower")]` names the type in system files; by default it is the name of the struct in that form.
+/// * `#[agent(methods(exact = 1.0, rough = 0.6))]` names the ways in which it can do its step, the best first, with their quality;
+///   `#[agent(anytime)]` says that its step refines its result while it may.
+/// * A field of type `Manager` is the end of a resource manager.
 #[proc_macro_derive(Agent, attributes(agent, port, robot))]
 pub fn agent(input: TokenStream) -> TokenStream {
     expand(input, agent::derive)

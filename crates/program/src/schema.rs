@@ -20,6 +20,7 @@ pub fn schema(registry: &Registry) -> Json {
         name,
         world,
         processors_,
+        as_declared_,
         robot_,
         executor_,
         agent_,
@@ -40,6 +41,12 @@ pub fn schema(registry: &Registry) -> Json {
             processors_,
             json!({"type": "integer", "minimum": 1, "maximum": 64, "description":
                 "In simulated time, on how many virtual processors steps take the cost that they declare."}),
+        ),
+        (
+            as_declared_,
+            flag(
+                "On the wall clock, too, lets steps take the cost that they declare: they work on until then.",
+            ),
         ),
         (robot_, named(robot(registry.get("robot")), "The robots.")),
         (executor_, named(executor(), "Threads besides the usual ones, or in their place.")),

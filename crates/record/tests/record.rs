@@ -574,7 +574,7 @@ fn definitions_are_those_of_ros() {
             log::message_header(),
             &[
                 "uint16 channel\nuint8 category\nuint8 priority\nuint32 marker\nuint64 sequence\nint64 stamp_nanoseconds\n\
-               int64 deadline_nanoseconds\nuint32 sender\nuint32 recipient\n",
+               int64 deadline_nanoseconds\nuint32 sender\nuint32 recipient\nuint8 quality\n",
             ],
         ),
     ];

@@ -13,7 +13,7 @@ use crate::plan::{AgentPlan, ExecutorPlan, Plan, WirePlan};
 use crate::port::Direction;
 use crate::queue_plan::{QueueSide, check_wire, other_type, serving_elsewhere};
 use crate::request::Refusal;
-use crate::router::{has_its_agent, robot_wires, timing_of, usual_executor};
+use crate::router::{commanded_by_two, has_its_agent, robot_wires, timing_of, usual_executor};
 
 /// All mistakes of a plan, in the order of the file as far as places are known.
 pub fn check(plan: &Plan, registry: &Registry) -> Vec<Mistake> {
@@ -28,6 +28,7 @@ pub fn check(plan: &Plan, registry: &Registry) -> Vec<Mistake> {
     for wire in &plan.wires {
         checker.wire(wire);
     }
+    checker.commands();
     checker.mistakes.sort_by_key(|mistake| mistake.at.start);
     checker.mistakes
 }
@@ -250,6 +251,23 @@ impl<'a> Checker<'a> {
         }
         if let Err(refusal) = checked {
             self.refuse(wire.at, refusal);
+        }
+    }
+
+    /// Inputs that take one sender have one.
+    fn commands(&mut self) {
+        let wires = wires_of(self.plan, self.registry);
+        let mut first: HashMap<&str, &str> = HashMap::new();
+        for wire in &wires {
+            let Some((agent, port)) = wire.to.rsplit_once('.') else { continue };
+            let kind = self.agents.get(agent).and_then(|agent| self.registry.get(&agent.kind));
+            if !kind.and_then(|kind| kind.port(port)).is_some_and(|port| port.options.single) {
+                continue;
+            }
+            match first.get(wire.to.as_str()) {
+                Some(one) => self.refuse(wire.at, commanded_by_two(one, &wire.from, &wire.to)),
+                None => drop(first.insert(&wire.to, &wire.from)),
+            }
         }
     }
 

@@ -70,6 +70,8 @@ pub(crate) struct Seat {
     /// How many refinements its last step made.
     pub refined: u32,
     pub last_step: Time,
+    /// Since when messages wait for it at least, where that is known.
+    pub ready_at: Time,
     pub next_release: Time,
     /// Whether its time has come and its step has not begun: it is among those that are due, once.
     pub is_due: bool,
@@ -165,6 +167,10 @@ pub(crate) struct Core {
     checks: Checks,
     /// How many stalls the witness had seen after the last step.
     stalls: u64,
+    /// Whether it is to be known since when messages wait: on the wall clock.
+    pub dates: bool,
+    /// When the last step of any agent began: what came before that was seen before that.
+    looked: Time,
     /// Since when agents are ready, by slot, where steps take time on a virtual processor: then who plays it counts them when they end.
     ready_since: Option<Vec<Time>>,
 }
@@ -206,6 +212,8 @@ impl Core {
             rate: rate(os::nanos_per_tick()),
             checks: Checks::default(),
             stalls: 0,
+            dates: false,
+            looked: Time(i64::MIN / 2),
             ready_since: None,
         };
         (core, Link { changes: change_in, answers: answer_out, given: 0, door, running })
@@ -252,8 +260,11 @@ impl Core {
     }
 
     fn find_whether_ready(&mut self, slot: u32) {
-        let Some(seat) = &self.seats[slot as usize] else { return };
+        let Some(seat) = &mut self.seats[slot as usize] else { return };
         if seat.on.iter().any(|input| input.has_message()) {
+            if self.dates {
+                seat.date(self.looked);
+            }
             self.ready.mark(slot);
         } else {
             // Where it serves a queue and was called, another one was there first.
@@ -273,7 +284,8 @@ impl Core {
         loop {
             let slot = self.ready.take()?;
             let Some(seat) = self.seats.get(slot as usize).and_then(Option::as_deref) else { continue };
-            let deadline = now.saturating_add(seat.timing.deadline);
+            let release = seat.ready_at.min(now);
+            let deadline = release.saturating_add(seat.timing.deadline);
             let is_active = seat.timing.means.is_active;
             if seat.timing.min_gap > Duration::ZERO && self.is_put_off(slot, now) {
                 continue;
@@ -282,7 +294,7 @@ impl Core {
                 self.rest_at_queues(slot, Rest::Away);
                 continue;
             }
-            return Some(Job { slot, release: now, deadline, by_clock: false });
+            return Some(Job { slot, release, deadline, by_clock: false });
         }
     }
 

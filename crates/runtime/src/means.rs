@@ -41,6 +41,8 @@ pub(crate) struct Means {
     pub refinement: Duration,
     /// Whether it runs at all.
     pub is_active: bool,
+    /// Whether on the wall clock, too, a step takes what is declared for it.
+    pub fills: bool,
 }
 
 impl Means {
@@ -52,12 +54,13 @@ impl Means {
         cost: Duration::ZERO,
         refinement: Duration::ZERO,
         is_active: true,
+        fills: false,
     };
 
     /// Whether a step needs nothing to be told.
     #[inline(always)]
     pub(crate) fn is_plain(&self) -> bool {
-        self.budget == Duration::ZERO && self.quality == Quality::FULL && self.method == 0
+        self.budget == Duration::ZERO && self.quality == Quality::FULL && self.method == 0 && !self.fills
     }
 
     /// What a plan gives an agent of this type, or all that is against it.
@@ -75,12 +78,10 @@ impl Means {
         }
         let quality = kind.methods.get(method).map_or(Quality::FULL, |method| Quality::of(method.quality));
         let is_active = !plan.giving.is_suspended;
-        let Some(budget) = plan.budget else {
-            return Ok(Means { method: method as u8, quality, is_active, ..Means::PLAIN });
-        };
+        let budget = plan.budget.unwrap_or(Duration::ZERO);
         let cost = plan.cost_of_step(kind.methods).unwrap_or(Duration::ZERO);
         let refinement = plan.refinement.unwrap_or(Duration::ZERO);
-        Ok(Means { method: method as u8, quality, budget, cost, refinement, is_active })
+        Ok(Means { method: method as u8, quality, budget, cost, refinement, is_active, fills: false })
     }
 }
 

@@ -15,7 +15,7 @@ use core::sync::atomic::{AtomicU64, Ordering};
 use std::any::Any;
 use std::sync::Arc;
 
-use types::{AgentId, Filter, Header, Priority};
+use types::{AgentId, Filter, Header, Priority, Time};
 
 use crate::door::Door;
 use crate::fetch::Depth;
@@ -61,11 +61,14 @@ pub struct PortOptions {
     pub priorities: &'static str,
     /// The port of the robot to which this one is wired when the plan names a robot for the agent.
     pub robot: Option<&'static str>,
+    /// Whether one sender at most may be wired to it: whoever commands an actuator commands it alone.
+    pub single: bool,
 }
 
 impl PortOptions {
-    /// By value, with normal priority, for no robot.
-    pub const DEFAULT: PortOptions = PortOptions { history: 0, rows: 0, priorities: "normal", robot: None };
+    /// By value, with normal priority, for no robot, with any number of senders.
+    pub const DEFAULT: PortOptions =
+        PortOptions { history: 0, rows: 0, priorities: "normal", robot: None, single: false };
 
     pub(crate) fn priorities(&self) -> impl Iterator<Item = Priority> + '_ {
         self.priorities.split(',').filter_map(|name| Priority::named(name.trim()))
@@ -209,6 +212,10 @@ pub(crate) trait InputEnd: Any + Send + Sync {
     fn leaving_box(&self) -> Box<dyn Any + Send>;
     /// Whether any message waits.
     fn has_message(&self) -> bool;
+    /// The stamp of the oldest message that waits; nothing where none does, or it is not known whose it will be.
+    fn oldest(&self) -> Option<Time> {
+        None
+    }
     /// After the step with this number: what it did with the messages that waited.
     fn settle(&self, step: u64) -> Settled;
     /// Before a step of an agent that takes messages out of a queue: nobody counts on it meanwhile.

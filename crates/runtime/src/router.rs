@@ -52,6 +52,7 @@ pub(crate) use calls::OutsideCall;
 pub use calls::ServiceShape;
 pub(crate) use staged::Staged;
 pub use timing::TIMING_KEYS;
+pub(crate) use wires::commanded_by_two;
 
 use timing::Nominal;
 
@@ -261,6 +262,8 @@ pub(crate) struct Router {
     /// By how many percent of what was measured of late the next step is counted, where steps are measured: in simulated time what the host
     /// took for them says nothing, and what they were played to take is exact.
     pub measures: Option<i64>,
+    /// Whether on the wall clock steps take what is declared for them.
+    pub as_declared: bool,
     /// When it was last looked whether somebody has outgrown what it was admitted with.
     grown_at: Time,
     log: LogChoice,
@@ -302,6 +305,7 @@ impl Router {
             now: Time::ZERO,
             admission: None,
             measures: None,
+            as_declared: false,
             grown_at: Time(i64::MIN / 2),
             log: LogChoice::default(),
             log_shared: LogShared::new(),
@@ -415,6 +419,13 @@ impl Router {
             Refusal::unknown(&format!("port of {}", known.plan.name), port, names)
         })?;
         Ok((known.id, place))
+    }
+
+    /// When an agent of this type runs, how, and for how long.
+    fn timing_for(&self, plan: &AgentPlan, kind: &AgentType) -> Reply<Timing> {
+        let mut timing = timing_as(plan, kind)?;
+        timing.means.fills = self.as_declared && timing.means.cost > Duration::ZERO;
+        Ok(timing)
     }
 
     fn executor_for(&self, plan: &AgentPlan, timing: Timing) -> Reply<usize> {

@@ -241,7 +241,7 @@ pub struct AgentStats {
     /// How long steps used their processor (ns): on the wall clock without what higher executors took from them. Those of `undisturbed`
     /// are not here.
     pub(crate) exec: Histogram,
-    /// How late steps began whose time had come (ns). A step that a message made run is released when it begins.
+    /// How late steps began whose time had come (ns). A step that a message made run is released when the message came, as far as that is known: when its executor was busy.
     pub jitter: Histogram,
     /// From the release to the end of the step (ns), but for those of `undisturbed`.
     pub(crate) response: Histogram,

@@ -137,6 +137,8 @@ pub struct Options {
     /// In simulated time: on how many virtual processors steps take the costs that the plan declares; none takes any time when nothing
     /// is said.
     pub processors: Option<usize>,
+    /// On the wall clock, lets each step take what its plan declares for it, where that is longer than what it needs: it works on until then.
+    pub as_declared: bool,
     /// What takes time of the virtual processors besides the agents.
     pub burdens: Vec<Burden>,
     /// Who tells resource managers how loaded the computer is, on the wall clock.
@@ -155,6 +157,7 @@ impl Default for Options {
             observer: Box::new(NoObserver),
             admission: None,
             processors: None,
+            as_declared: false,
             burdens: Vec::new(),
             host: None,
             parse: |words| Err(Refusal::new(format!("\"{}\" cannot be asked here", words.join(" ")))),
@@ -261,6 +264,7 @@ pub(crate) fn build(
         Router::new(&plan.name, registry.clone(), executors, robots.unwrap_or_default(), directory.clone());
     router.set_log(options.log.clone());
     router.set_admission(options.admission.clone());
+    router.as_declared = options.as_declared;
     if let Some(host) = options.host.take() {
         router.set_host(Arc::new(std::sync::Mutex::new(host)));
     }

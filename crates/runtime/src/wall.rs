@@ -125,6 +125,7 @@ impl Live {
         let mut options = options;
         let mut built = build(plan, registry, &mut options, clock.now())?;
         built.router.measures = Some(crate::router::WITH_MARGIN);
+        built.cores.iter_mut().for_each(|core| core.dates = true);
         let (control, asks) = asks();
         let mut timed = Vec::new();
         for request in &plan.requests {

@@ -7,7 +7,7 @@ use crate::failure::Failure;
 use crate::tool::Tool;
 use crate::workspace::Workspace;
 
-const SCENARIOS: [&str; 2] = ["exploration", "annex"];
+const SCENARIOS: [&str; 3] = ["exploration", "annex", "home"];
 const SEEDS: usize = 10;
 
 /// So many of the seeds must reach the goal; none may touch anything.
@@ -31,7 +31,37 @@ pub(super) fn run(workspace: &Workspace) -> Result<Done, Failure> {
     let logged = sinew::document(logged, &remedy(SCENARIOS[0]))?;
     takes_no_memory(&logged).map_err(|what| Failure::new(what, remedy(SCENARIOS[0])))?;
     seen.push("no memory taken in real time".to_owned());
+    let out = workspace.fresh_scratch("overload")?;
+    let words = ["run", "overload", "--json", "--out"];
+    let run =
+        sinew::document(Tool::new(&program, &workspace.root).args(words).arg(&out), &remedy("overload"))?;
+    keeps_in_time(&run)
+        .and_then(|()| takes_no_memory(&run))
+        .map_err(|what| Failure::new(what, remedy("overload")))?;
+    if !out.join("bands.png").is_file() {
+        return Err(Failure::new("overload: there is no figure bands.png".to_owned(), remedy("overload")));
+    }
+    seen.push("overload managed".to_owned());
     Ok(Done::Passed(seen.join(", ")))
+}
+
+/// Who must not miss a deadline, whatever there is to do.
+const IN_TIME: [&str; 3] = ["safety", "drive", "sonar"];
+
+/// Under overload those miss nothing, and the robot touches nothing.
+fn keeps_in_time(run: &Value) -> Result<(), String> {
+    for name in IN_TIME {
+        let agent = run["agents"].as_array().into_iter().flatten().find(|agent| agent["name"] == name);
+        match agent.and_then(|agent| agent["missed"].as_u64()) {
+            Some(0) => {}
+            Some(missed) => return Err(format!("{name} missed {missed} deadlines")),
+            None => return Err(format!("the document does not tell what {name} missed")),
+        }
+    }
+    match run["collisions"].as_u64() {
+        Some(0) => Ok(()),
+        other => Err(format!("collisions: {other:?}")),
+    }
 }
 
 /// No step of a real-time agent, nor its executor, may take or free memory.
@@ -112,6 +142,20 @@ mod tests {
         assert!(judge(&greedy).unwrap_err().contains("{\"wall\":2}"));
         greedy["runs"][3]["allocations"] = Value::Null;
         assert!(judge(&greedy).unwrap_err().contains("no \"allocations\""), "nobody watched");
+    }
+
+    #[test]
+    fn under_overload_who_misses_is_named() {
+        let of = |missed: u64| {
+            let agents: Vec<Value> = IN_TIME
+                .iter()
+                .map(|name| json!({"name": name, "missed": if *name == "drive" { missed } else { 0 }}))
+                .collect();
+            json!({"agents": agents, "collisions": 0})
+        };
+        assert_eq!(keeps_in_time(&of(0)), Ok(()));
+        assert_eq!(keeps_in_time(&of(2)).unwrap_err(), "drive missed 2 deadlines");
+        assert!(keeps_in_time(&json!({"agents": [], "collisions": 0})).is_err(), "nobody is there");
     }
 
     #[test]

@@ -1,5 +1,5 @@
 //! `[burden.NAME]`: work of other processes with a real-time priority, for seeing what becomes of a system beside it; and `processors`: on how
-//! many virtual ones simulated steps take their time.
+//! many virtual ones simulated steps take their time; and `as_declared`: whether they do so on the wall clock, too.
 
 use runtime::{Burden, Plan};
 use types::Duration;
@@ -10,6 +10,7 @@ use super::read::{Reader, span_of_time};
 /// The sections that are read here.
 const BURDEN: &str = "burden";
 const PROCESSORS: &str = "processors";
+const AS_DECLARED: &str = "as_declared";
 /// As many virtual processors as there can be.
 const MOST_PROCESSORS: i64 = 64;
 /// How often a burden works when nothing is said.
@@ -26,7 +27,13 @@ pub(super) fn read(reader: &mut Reader<'_>, tree: &Table) {
         let what = format!("\"{PROCESSORS}\" is {}, not a number from 1 to {MOST_PROCESSORS}", entry.value);
         reader.mistakes.push(Mistake::new(entry.at, what));
     }
-    for section in [PROCESSORS, BURDEN] {
+    if let Some(entry) = tree.get(AS_DECLARED)
+        && !matches!(entry.value, Value::Bool(_))
+    {
+        let what = format!("\"{AS_DECLARED}\" is {}, not true or false", entry.value);
+        reader.mistakes.push(Mistake::new(entry.at, what));
+    }
+    for section in [PROCESSORS, AS_DECLARED, BURDEN] {
         if let Some(entry) = tree.get(section) {
             reader.plan.sections.set(section, entry.clone());
         }
@@ -41,6 +48,11 @@ fn processors_of(value: &Value) -> Option<usize> {
 /// On how many virtual processors simulated steps take their time, where the plan says so.
 pub(crate) fn processors(plan: &Plan) -> Option<usize> {
     processors_of(&plan.sections.get(PROCESSORS)?.value)
+}
+
+/// Whether steps take what is declared for them on the wall clock, too.
+pub(crate) fn as_declared(plan: &Plan) -> bool {
+    plan.sections.get(AS_DECLARED).is_some_and(|entry| entry.value == Value::Bool(true))
 }
 
 /// The burdens of a plan that was read without mistakes.

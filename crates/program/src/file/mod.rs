@@ -31,7 +31,7 @@ pub(crate) mod tree;
 mod wires;
 mod write;
 
-pub(crate) use burden::{burdens, processors};
+pub(crate) use burden::{as_declared, burdens, processors};
 pub(crate) use compare::compared;
 pub(crate) use decide::read_alone;
 pub use library::{Found, Shelf};

@@ -19,10 +19,11 @@ use super::wires::Written;
 use super::{burden, compare, decide, knowledge, set, tree};
 
 /// The sections of a system file.
-pub(crate) const SECTIONS: [&str; 15] = [
+pub(crate) const SECTIONS: [&str; 16] = [
     "name",
     "world",
     "processors",
+    "as_declared",
     "robot",
     "executor",
     "agent",

@@ -70,11 +70,10 @@ pub(super) fn run(
         bands.extend(own.log.as_deref().and_then(|log| band(log, value, &summary, &scenario)));
     }
     let picture = Bands { bands, spans: spans(&whole.scenario.file.plan), window: None }.draw();
-    let files = figures::write(&picture, &place.folder, "bands")
-        .unwrap_or_else(|error| {
-            terminal::tell(&format!("warning: no figure of bands: {error}"));
-            Vec::new()
-        });
+    let files = figures::write(&picture, &place.folder, "bands").unwrap_or_else(|error| {
+        terminal::tell(&format!("warning: no figure of bands: {error}"));
+        Vec::new()
+    });
     let names = first.done.iter().map(|done| done.name.clone());
     let head: Vec<String> = [key.rsplit('.').next().unwrap_or(key).to_owned(), "useful".to_owned()]
         .into_iter()
@@ -82,7 +81,10 @@ pub(super) fn run(
         .collect();
     let mut all = vec![head];
     all.extend(lines);
-    let mut said = vec![format!("  compared     useful work in all, and of each agent, with the deadlines that it missed\n{}", table(&all, 1))];
+    let mut said = vec![format!(
+        "  compared     useful work in all, and of each agent, with the deadlines that it missed\n{}",
+        table(&all, 1)
+    )];
     said.extend(files.iter().map(|file| format!("               {file}")));
     Ok(said)
 }
@@ -141,7 +143,8 @@ fn band(log: &Path, title: &str, summary: &Summary, scenario: &Scenario) -> Opti
             }
         }
         // The first second is that of the start.
-        let mut usual: Vec<u32> = counts.iter().copied().take((calm / BIN).min(1e6) as usize).skip(1).collect();
+        let mut usual: Vec<u32> =
+            counts.iter().copied().take((calm / BIN).min(1e6) as usize).skip(1).collect();
         usual.sort_unstable();
         let usual = usual.get(usual.len() / 2).copied().unwrap_or(1).max(1);
         let share = |count: &u32| (f64::from(*count) / f64::from(usual)).min(1.0);
@@ -157,4 +160,84 @@ fn band(log: &Path, title: &str, summary: &Summary, scenario: &Scenario) -> Opti
     });
     let all = useful(&summary.done).map_or(String::new(), |share| format!(": {:.1} % useful", share * 100.0));
     Some(RateBand { title: format!("{title}{all}"), rows: rows.collect() })
+}
+
+#[cfg(test)]
+mod tests {
+    use runtime::{Options, Report, Simulation};
+
+    use super::*;
+    use crate::run::useful::{Done, done};
+    use crate::run::with_robots;
+
+    /// The overload experiment by one policy, on two virtual processors.
+    fn overload(policy: &str) -> (Report, Vec<Done>) {
+        let registry = with_robots(agents::registry());
+        let sets = [format!("agent.manager.policy={policy}")];
+        let file = file::load("overload", &sets, &registry).unwrap();
+        let ready = Scenario { file, registry }.prepare(1).unwrap();
+        let processors = file::processors(&ready.plan).unwrap();
+        let options = Options {
+            limit: Some(Duration::secs(60)),
+            admission: Some(ready.admission(processors, Duration::ZERO, false)),
+            processors: Some(processors),
+            burdens: file::burdens(&ready.plan),
+            parse: control::words::parse,
+            ..Options::default()
+        };
+        let report = Simulation::new(&ready.plan, &ready.registry, options).unwrap().run().unwrap();
+        let done = done(&ready, &report.view.agents, report.time);
+        (report, done)
+    }
+
+    fn missed(done: &[Done], names: &[&str]) -> u64 {
+        done.iter().filter(|done| names.contains(&done.name.as_str())).map(|done| done.missed).sum()
+    }
+
+    const CARE: [&str; 3] = ["safety", "drive", "sonar"];
+    const PICTURES: [&str; 3] = ["camera", "track", "finder"];
+
+    #[test]
+    fn who_matters_misses_nothing_and_more_useful_work_is_done_than_by_nobody_or_by_halving_rates() {
+        let ((managed, by_manager), (_, by_nobody), (_, by_ladder)) =
+            (overload("elastic"), overload("none"), overload("ladder"));
+        assert_eq!(missed(&by_manager, &CARE), 0);
+        assert!(
+            missed(&by_nobody, &PICTURES) > 100 && missed(&by_nobody, &["planner"]) > 10,
+            "{by_nobody:?}"
+        );
+        assert!(
+            missed(&by_manager, &PICTURES) < 20 && missed(&by_manager, &["planner"]) < 5,
+            "{by_manager:?}"
+        );
+        let [manager, nobody, ladder] = [by_manager, by_nobody, by_ladder].map(|done| useful(&done).unwrap());
+        assert!(manager > nobody && manager > ladder, "{manager} {nobody} {ladder}");
+        // At the end, 10 s after the load fell, all is as it was asked for.
+        let agent = |name: &str| managed.view.agents.iter().find(|agent| agent.name == name).unwrap();
+        assert_eq!(agent("planner").period, Some(Duration::millis(200)));
+        assert_eq!(agent("planner").budget, Some(Duration::millis(80)));
+        assert_eq!([agent("track").method, agent("finder").method], [Some("exact"); 2]);
+        assert!(managed.view.agents.iter().all(|agent| !agent.is_suspended));
+    }
+
+    #[test]
+    fn the_same_overload_twice_gives_the_same_settings_at_the_same_time() {
+        let told = |(report, _): (Report, Vec<Done>)| {
+            let all = report.view.agents.into_iter();
+            all.map(|agent| (agent.name, agent.counts.releases, agent.counts.missed)).collect::<Vec<_>>()
+        };
+        assert_eq!(told(overload("elastic")), told(overload("elastic")));
+    }
+
+    #[test]
+    fn what_weighs_at_the_same_time_is_one_span() {
+        let registry = with_robots(agents::registry());
+        let plan = file::load("overload", &[], &registry).unwrap().plan;
+        let told: Vec<_> = spans(&plan).into_iter().map(|span| (span.from, span.to, span.label)).collect();
+        let expected = [
+            (20.0, 40.0, "3 × as long: camera, track, finder".to_owned()),
+            (25.0, 40.0, "another process takes 90 % of a processor".to_owned()),
+        ];
+        assert_eq!(told, expected);
+    }
 }

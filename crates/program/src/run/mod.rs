@@ -191,6 +191,7 @@ impl One<'_> {
             observer: Box::new(judge),
             admission: Some(ready.admission(self.processors(&ready), self.overhead(), self.args.force)),
             processors: self.virtual_processors(&ready),
+            as_declared: file::as_declared(&ready.plan),
             burdens: if self.clock == ClockChoice::Sim { file::burdens(&ready.plan) } else { Vec::new() },
             host: (self.clock == ClockChoice::Wall).then(|| Box::new(ProcHost::new()) as Box<dyn Host>),
             parse: control::words::parse,

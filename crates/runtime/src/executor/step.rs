@@ -21,7 +21,7 @@ use crate::allocations;
 use crate::context::Context;
 use crate::door::Door;
 use crate::handover::Running;
-use crate::means::Refining;
+use crate::means::{Means, Refining};
 use crate::os;
 use crate::port::Rest;
 use crate::processor::{Moment, Stopwatch, agrees, scaled};
@@ -36,8 +36,18 @@ enum Special {
     Start,
     /// It panics on request.
     Panic,
-    /// It takes several times as long, on request.
-    Heavy,
+    /// It takes longer than it needs, on request: several times as long, or as long as is declared.
+    Longer,
+}
+
+/// How long a step is to take that takes longer than it needs.
+#[derive(Clone, Copy, Debug, Default)]
+struct Longer {
+    /// What is declared for it, and for a refinement of it (ns); zero where it takes what it takes.
+    declared: u64,
+    refinement: u64,
+    /// How many times that.
+    times: u64,
 }
 
 /// The step that is being made, as a thread knows it that has perhaps lost the core.
@@ -51,6 +61,7 @@ struct Turn {
     /// How often the steps took or freed memory, and how often a start did, which may.
     foreign: u64,
     in_start: u64,
+    longer: Longer,
 }
 
 impl Turn {
@@ -95,7 +106,8 @@ impl Core {
             method: 0,
             refining: Refining::NONE,
         };
-        let mut turn = Turn { job, step, body: None, checked: None, foreign: 0, in_start: 0 };
+        let mut turn =
+            Turn { job, step, body: None, checked: None, foreign: 0, in_start: 0, longer: Longer::default() };
         // SAFETY: the caller owns the core, and others keep this, too, for as long as the thread lives; the borrow ends in this line.
         let running: &Running = unsafe { &*Arc::as_ptr(&(*core).running) };
         // SAFETY: as the caller promises.
@@ -217,9 +229,12 @@ impl Core {
         let body = NonNull::from(body);
         bump(&seat.stats.releases);
         let mut special = Special::Nothing;
-        if seat.fault != StepFault::None || !seat.started {
+        if seat.fault != StepFault::None || !seat.started || seat.timing.means.fills {
             special = match seat.prepare(slot) {
-                Ok(special) => special,
+                Ok(special) => {
+                    turn.longer = seat.longer();
+                    special
+                }
                 Err(ended) => {
                     running.limit.store(seat.timing.hang_after.0 as u64, Ordering::Relaxed);
                     self.not_made(slot, &ended);
@@ -229,6 +244,8 @@ impl Core {
         }
         seat.last_step = begun.time;
         seat.put_off = Time::NEVER;
+        seat.ready_at = Time::NEVER;
+        self.looked = begun.time;
         if turn.job.by_clock {
             seat.stats.jitter.add(nanos(begun.time - turn.job.release));
         }
@@ -278,6 +295,9 @@ impl Core {
         if seat.serves {
             self.rest(slot, Rest::Stepped(took));
         } else if took && left {
+            if self.dates {
+                seat.date(seat.last_step);
+            }
             self.ready.mark(slot);
         }
     }
@@ -325,7 +345,7 @@ impl Core {
         };
         let others = begun.reading.others(&ended.reading);
         let stalls = watch.map_or(0, |watch| watch.witness.stalls());
-        if !turn.job.by_clock && others == 0 && stalls == self.stalls && turn.checked.is_none() {
+        if !turn.job.by_clock && turn.job.release == begun.time && others == 0 && stalls == self.stalls && turn.checked.is_none() {
             // It began when it was released, and nobody interrupted it: what it used is what it took.
             seat.stats.undisturbed.add(took);
         } else {
@@ -450,6 +470,23 @@ impl Seat {
         self.body.take()
     }
 
+    /// Notes since when messages wait for it: since they were stamped, but no longer than since a time at which they were not there.
+    #[inline(never)]
+    pub(super) fn date(&mut self, looked: Time) {
+        let oldest = self.on.iter().filter_map(|input| input.oldest()).min();
+        if let Some(oldest) = oldest {
+            self.ready_at = self.ready_at.min(oldest.max(looked));
+        }
+    }
+
+    /// How long a step takes that takes longer than it needs.
+    fn longer(&self) -> Longer {
+        let Means { cost, refinement, fills, .. } = self.timing.means;
+        let times = if self.fault == StepFault::Heavy { HEAVY as u64 } else { 1 };
+        let of = |span| if fills { nanos(span) } else { 0 };
+        Longer { declared: of(cost), refinement: of(refinement), times }
+    }
+
     /// Says how the step shall be done, and for how long.
     #[inline(never)]
     fn choose(&self, context: &Context, step: &mut Step, clock: Option<(u64, u64)>) {
@@ -458,6 +495,8 @@ impl Seat {
             (means.cost, means.refinement) = (means.cost * HEAVY, means.refinement * HEAVY);
         }
         step.method = usize::from(means.method);
+        // Where steps take what is declared, so do refinements.
+        let clock = clock.filter(|_| !means.fills);
         step.refining = Refining::of(&means, step.now, step.deadline, clock);
         context.set_quality(means.quality);
     }
@@ -503,7 +542,8 @@ impl Seat {
         }
         Ok(match self.fault {
             _ if first => Special::Start,
-            StepFault::Heavy => Special::Heavy,
+            StepFault::Heavy => Special::Longer,
+            _ if self.timing.means.fills => Special::Longer,
             _ => Special::Nothing,
         })
     }
@@ -520,11 +560,17 @@ fn unusual(
     if special == Special::Panic {
         panic!("asked to panic");
     }
-    if special == Special::Heavy {
-        let begun = os::ticks();
+    if special == Special::Longer {
+        // Of the thread's own time: what others take meanwhile is not work.
+        let begun = if on_the_wall { os::thread_time() } else { 0 };
         let done = body.step(&mut turn.step);
-        let over = begun + (os::ticks() - begun) * HEAVY as u64;
-        while on_the_wall && os::ticks() < over {
+        let Longer { declared, refinement, times } = turn.longer;
+        let used = || os::thread_time().saturating_sub(begun);
+        let all = match declared {
+            0 if on_the_wall => used() * times,
+            _ => (declared + refinement * u64::from(turn.step.refining.count)) * times,
+        };
+        while on_the_wall && used() < all {
             core::hint::spin_loop();
         }
         return done;

@@ -145,6 +145,10 @@ impl<T: Message> InputEnd for InputCore<T> {
         self.inner().has_message()
     }
 
+    fn oldest(&self) -> Option<Time> {
+        self.inner().oldest()
+    }
+
     fn settle(&self, step: u64) -> Settled {
         let inner = self.inner();
         Settled { took: inner.opened & !1 == step, left: inner.has_message() }
@@ -365,6 +369,16 @@ impl<T: Message> InputInner<T> {
     #[inline]
     fn has_message(&self) -> bool {
         self.lanes.iter().any(|lane| lane.staged || lane.source.has_message())
+    }
+
+    #[inline(never)]
+    fn oldest(&mut self) -> Option<Time> {
+        let own = self.lanes.iter_mut().filter(|lane| !matches!(lane.source, Source::Queue(_)));
+        let stamps = own.filter_map(|lane| {
+            lane.staged = lane.staged || lane.source.advance();
+            lane.staged.then(|| lane.source.header().stamp)
+        });
+        stamps.min()
     }
 
     fn note_taken(&mut self) {

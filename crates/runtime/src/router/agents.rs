@@ -8,7 +8,7 @@ use types::{AgentId, Name, Time};
 
 use super::script::{Step, What};
 use super::timing::{Nominal, TIMING_KEYS};
-use super::{Known, Reply, Rings, Router, SPARE_SEATS, Staged, Wire, first, robot_wires, timing_as};
+use super::{Known, Reply, Rings, Router, SPARE_SEATS, Staged, Wire, first, robot_wires};
 use crate::agent::{AgentType, Body};
 use crate::executor::{Change, Seat, StepFault};
 use crate::plan::{AgentPlan, WirePlan};
@@ -32,7 +32,7 @@ impl Router {
             .clone();
         let (_, params) = kind.read_params(&plan.params).map_err(first)?;
         let mut body = kind.build(&plan.params).map_err(first)?;
-        let timing = timing_as(&plan, &kind)?;
+        let timing = self.timing_for(&plan, &kind)?;
         let executor = self.executor_for(&plan, timing)?;
         self.check_budget(&plan, &timing, executor)?;
         let ends = new_ends(&plan, &kind, body.as_mut(), readers)?;
@@ -114,6 +114,7 @@ impl Router {
             put_off: Time::NEVER,
             refined: 0,
             last_step: Time(i64::MIN / 2),
+            ready_at: Time::NEVER,
             started: false,
             fault: known.fault,
             lost: false,

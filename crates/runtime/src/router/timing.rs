@@ -4,7 +4,7 @@ use types::Duration;
 use types::value::Value;
 
 use super::script::{Step, What};
-use super::{Reply, Router, Staged, timing_as};
+use super::{Reply, Router, Staged};
 use crate::census::Given;
 use crate::executor::Change;
 use crate::plan::AgentPlan;
@@ -136,7 +136,7 @@ impl Router {
                 plan.name
             )));
         }
-        let timing = timing_as(&plan, &known.kind)?;
+        let timing = self.timing_for(&plan, &known.kind)?;
         self.check_budget(&plan, &timing, known.executor)?;
         let change = Change::Timing { slot: known.slot, timing };
         let step = Step { executor: known.executor, of: id, ring: None, what: What::Change(change) };

@@ -12,6 +12,12 @@ use crate::ring::Overload;
 use crate::service::answers_for;
 use types::{Filter, Priority, Time};
 
+/// Why a second sender cannot be wired to a port that takes one.
+pub(crate) fn commanded_by_two(one: &str, other: &str, port: &str) -> Refusal {
+    Refusal::new(format!("both {one} and {other} command {port}"))
+        .help("wire both to a coordinator, which chooses or fuses, and that to the actuator")
+}
+
 impl Router {
     pub(super) fn find_wire(&self, from: PortId, to: PortId) -> Option<&Wire> {
         let wires = self.agents.get(&from.0)?.wires.iter().filter_map(|id| self.wires.get(id));
@@ -38,6 +44,12 @@ impl Router {
         let (from, to) = (self.port(&plan.from)?, self.port(&plan.to)?);
         if self.find_wire(from, to).is_some() {
             return Err(Refusal::new(format!("{} is already wired to {}", plan.from, plan.to)));
+        }
+        if self.agents[&to.0].kind.ports[to.1].options.single {
+            let wires = self.agents[&to.0].wires.iter().filter_map(|id| self.wires.get(id));
+            if let Some(other) = wires.into_iter().find(|wire| wire.to == to) {
+                return Err(commanded_by_two(&self.plan_of(other).from, &plan.from, &plan.to));
+            }
         }
         let recipient = plan.filter.recipient.as_ref().map(|name| self.id_of(name)).transpose()?;
         let filter = plan.filter.with_recipient(recipient);

@@ -317,3 +317,17 @@ fn who_outgrows_what_it_was_admitted_with_is_told_at_once() {
     let told: Vec<&str> = said(&report).into_iter().filter(|what| what.contains("admitted with")).collect();
     assert_eq!(told, ["took 6.000 ms for a step, and was admitted with 2.000 ms"]);
 }
+
+#[test]
+fn on_the_wall_clock_steps_take_what_is_declared_where_that_is_asked_for() {
+    let mut plan = team();
+    let worker = plan.agent_mut("worker").unwrap();
+    worker.cost = Some(Duration::millis(2));
+    (worker.refinement, worker.budget) = (Some(Duration::millis(1)), Some(Duration::micros(4500)));
+    let options = Options { as_declared: true, limit: Some(Duration::millis(300)), ..Options::default() };
+    let report = runtime::Live::new(&plan, &registry![Worker, Ear, Boss], options).unwrap().run().unwrap();
+    let worker = &report.view.agents[0];
+    // Two of them, and with the two milliseconds that a step takes without: but for the first, which is its start.
+    assert!(worker.exec.p50 >= 3.6e6, "{:?}", worker.exec);
+    assert!(worker.counts.refinements >= 2 * (worker.counts.releases - 2), "{:?}", worker.counts);
+}

@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use knowledge::{DecisionTable, Kind, Knowledge, KnowledgeError, Snapshot, colours};
-use types::value::{Mistake, Span, Table, nearest};
+use types::value::{Mistake, Span, Table, Value, nearest};
 
 use super::known::{Known, Taken};
 use crate::error::Failure;
@@ -41,7 +41,17 @@ pub(super) fn take(
     if let Some((name, at)) = &section.decide {
         let newest = knowledge.read().and_then(|now| now.newest(name)).map_err(failed)?;
         known.table = Some(match (newest, decider(&file.plan).and_then(table_of)) {
-            (Some(version), _) => Taken { version: version.number, table: version.weights },
+            (Some(version), own) => {
+                let text = |table: &Table| Value::Table(table.clone()).to_string();
+                if own.is_some_and(|own| text(own) != text(&version.weights)) {
+                    tell(&format!(
+                        "table \"{name}\", version {}, in {} is in force; [decide] says something else",
+                        version.number,
+                        store.display()
+                    ));
+                }
+                Taken { version: version.number, table: version.weights }
+            }
             (None, Some(table)) => {
                 let first =
                     DecisionTable { name: name.clone(), weights: table.clone(), time: terminal::host_date() };

@@ -49,11 +49,11 @@ fn the_command_line_names_a_store_in_the_place_of_the_files() {
 fn what_cannot_be_read_is_told_with_its_place_and_what_mends_it() {
     for (system, wanted) in [
         (
-            format!("{SYSTEM}[knowledge]\nfile = \"nowhere/home.db\"\n"),
-            "error: nowhere/home.db cannot be read or written: unable to open database file: nowhere/home.db
+            format!("{SYSTEM}[knowledge]\nfile = \"small.toml/home.db\"\n"),
+            "error: small.toml/home.db cannot be read or written: unable to open database file: small.toml/home.db
  --> small.toml:9:8
-9 | file = \"nowhere/home.db\"
-  |        ^^^^^^^^^^^^^^^^^
+9 | file = \"small.toml/home.db\"
+  |        ^^^^^^^^^^^^^^^^^^^^
   = help: nothing was changed; look at the folder, the rights of both, and the room on the disk
 ",
         ),
