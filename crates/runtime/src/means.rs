@@ -230,12 +230,12 @@ mod tests {
     #[test]
     fn on_the_wall_clock_it_ends_when_the_time_is_used() {
         let means = Means { budget: Duration::millis(2), ..Means::PLAIN };
-        let clock = Some((os::ticks(), crate::processor::rate(os::nanos_per_tick())));
-        let mut refining = Refining::of(&means, Time::ZERO, Time::NEVER, clock);
+        let rate = crate::processor::rate(os::nanos_per_tick());
+        let mut refining = Refining::of(&means, Time::ZERO, Time::NEVER, Some((os::ticks(), rate)));
         while refining.may_go_on() {}
         assert!(refining.used + refining.longest > 2_000_000, "{refining:?}");
         assert!(refining.count > 0);
-        let late = Some((os::ticks() - (4e6 / os::nanos_per_tick()) as u64, clock.unwrap().1));
+        let late = Some((os::ticks() - (4e6 / os::nanos_per_tick()) as u64, rate));
         assert!(!Refining::of(&means, Time::ZERO, Time::NEVER, late).may_go_on(), "it is used up");
     }
 }

@@ -14,6 +14,7 @@ use crate::ring::Overload;
 use crate::stats::Figure;
 
 /// A request to a running system. All of it is checked first; it is refused with a reason, or done whole.
+#[allow(clippy::large_enum_variant)] // requests are few, and plans are kept by value everywhere
 #[derive(Clone, Debug)]
 pub enum Request {
     /// Adds an agent, wired to its robot where the plan says so.

@@ -178,7 +178,7 @@ impl Window {
 
     /// The longest step as far as the window has been looked at, and since.
     pub(crate) fn longest(&self, stats: &AgentStats) -> Duration {
-        self.new(stats).1
+        self.since_before(stats).1
     }
 
     /// How many steps there were, and the longest of them, to an eighth of a doubling.
@@ -192,10 +192,10 @@ impl Window {
             self.before = core::mem::replace(&mut self.this, counts);
             self.begun = Some(now);
         }
-        self.new(stats)
+        self.since_before(stats)
     }
 
-    fn new(&self, stats: &AgentStats) -> (u64, Duration) {
+    fn since_before(&self, stats: &AgentStats) -> (u64, Duration) {
         let counts = stats.exec_counts();
         let new = |at: usize| counts[at] - self.before.get(at).copied().unwrap_or(0);
         let steps = (0..BUCKETS).map(new).sum();

@@ -1,6 +1,6 @@
 //! From what there is to what the analysis sees of it, and what may be taken from whom.
 
-use runtime::{Census, HostReading, Resident};
+use runtime::{Census, Foreign, HostReading, Resident};
 use schedule::Exact;
 use schedule::manage::{Anytime, Managed, Orders as Wanted, Way};
 use schedule::system::{Agent, Executor, Source, System};
@@ -9,6 +9,8 @@ use types::{Duration, Time};
 
 use super::ResourceParams;
 
+/// Who takes less of a processor disturbs no measurement.
+const LEAST_SHARE: f32 = 0.02;
 /// Where executors by deadline stand among the others, and so processes by deadline too.
 const ABOVE_ALL: u8 = 100;
 
@@ -55,7 +57,11 @@ impl Model {
         self.seen.resize(census.residents.len(), Seen::default());
         let residents = census.residents.iter().zip(&mut self.seen);
         for (agent, (resident, seen)) in system.agents.iter_mut().zip(residents) {
-            look(resident, seen, census.percent, now, params.believes);
+            let executor = &census.system.executors[agent.executor];
+            // What another process takes from a step is in what the step is said to have taken.
+            if !host.burdens.iter().any(|burden| stands_over(burden, executor)) {
+                look(resident, seen, census.percent, now, params.believes);
+            }
             agent.cost = exact(cost_of(resident, 0, seen.times) + census.overhead);
         }
         for burden in &host.burdens {
@@ -88,6 +94,12 @@ impl Model {
             })
             .collect()
     }
+}
+
+/// Whether another process takes time from the steps of an executor.
+fn stands_over(burden: &Foreign, executor: &Executor) -> bool {
+    let priority = if burden.priority == 0 { ABOVE_ALL } else { burden.priority };
+    burden.share > LEAST_SHARE && burden.may & executor.may != 0 && Some(priority) > executor.priority
 }
 
 /// What steps took of late beside what is declared for them. Where there were none, what was seen last is believed for some time.

@@ -345,7 +345,12 @@ impl Core {
         };
         let others = begun.reading.others(&ended.reading);
         let stalls = watch.map_or(0, |watch| watch.witness.stalls());
-        if !turn.job.by_clock && turn.job.release == begun.time && others == 0 && stalls == self.stalls && turn.checked.is_none() {
+        if !turn.job.by_clock
+            && turn.job.release == begun.time
+            && others == 0
+            && stalls == self.stalls
+            && turn.checked.is_none()
+        {
             // It began when it was released, and nobody interrupted it: what it used is what it took.
             seat.stats.undisturbed.add(took);
         } else {

@@ -88,7 +88,7 @@ impl Busy {
             if !self.processors.is_busy(thread) {
                 self.processors.submit(thread, -i128::from(burden.priority), burden.work().0.into());
             }
-            *next = *next + burden.period.max(Duration(1));
+            *next += burden.period.max(Duration(1));
             if *next - Time::ZERO >= burden.until {
                 *next = Time::NEVER;
             }

@@ -1,7 +1,7 @@
 //! Methods, refinements and rest, and a manager that sees and sets them.
 
 use super::*;
-use runtime::{Admission, Burden, Control, Given, Manager, Report};
+use runtime::{Admission, Burden, Given, Manager, Report};
 
 /// Says by which method it works, and how often it refined.
 #[derive(Agent)]
@@ -75,6 +75,11 @@ impl Agent for Boss {
             (load * 100.0).round(),
             (host.foreign * 100.0).round()
         );
+        if let Some(agent) = census.residents.iter().find(|agent| agent.plan.name == "worker") {
+            let millis = |period: Option<Duration>| period.map_or(0.0, |period| period.0 as f64 * 1e-6);
+            let (asked, now) = (millis(agent.nominal.period), millis(agent.plan.period));
+            runtime::note!("asked for {} ms, now {} ms", asked, now);
+        }
         if let Some(refused) = &census.refused {
             runtime::note!("refused");
             assert!(refused.what.contains("must lie from"), "{refused}");
@@ -251,11 +256,7 @@ fn managed(rests: bool, period: i64) -> Plan {
 #[test]
 fn a_manager_sets_what_agents_may_use_and_what_was_asked_for_stays_known() {
     let secs = |secs| Options { limit: Some(Duration::secs(secs)), ..Options::default() };
-    let plan = managed(false, 40);
-    let simulation = Simulation::new(&plan, &registry![Worker, Ear, Boss], secs(1)).unwrap();
-    let control: Control = simulation.control();
-    let asker = std::thread::spawn(move || control.plan());
-    let report = simulation.run().unwrap();
+    let report = run(managed(false, 40), secs(1), &[]);
     // The first look finds nothing, so the third is at 300 ms: 15 steps until 280, the next after 40 ms at 320, and so to 1 s.
     assert_eq!(report.view.agents[0].period, Some(Duration::millis(40)));
     assert_eq!(
@@ -263,9 +264,8 @@ fn a_manager_sets_what_agents_may_use_and_what_was_asked_for_stays_known() {
         15 + 1 + 17,
         "from 300 on, which was released already, every 40"
     );
-    if let Ok(Ok((agents, _, _))) = asker.join() {
-        assert_eq!(agents[0].period, Some(Duration::millis(20)), "as it was asked for");
-    }
+    let told = noted(&report);
+    assert!(told.iter().any(|(what, _)| what == "asked for 20 ms, now 40 ms"), "{told:?}");
     let rests = run(managed(true, 40), secs(1), &[]);
     assert!(rests.view.agents[0].is_suspended);
     let refused = run(managed(false, 60), secs(1), &[]);
