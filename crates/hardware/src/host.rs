@@ -1,12 +1,12 @@
 //! The computer as a sensor: how loaded its processors and its memory are, from what the kernel tells in `/proc`.
 //!
-//! Times of processors and threads are differences between two readings. Of other processes only those with a real-time priority are looked
+//! Times of processors and threads are differences between two readings. Of other processes only threads with a real-time priority are looked
 //! at one by one, since only they take anything from ours; who they are is looked for once a second.
 
 use std::collections::HashMap;
 use std::time::{Duration, Instant};
 
-use procfs::process::{Process, all_processes};
+use procfs::process::{Process, Task, all_processes};
 use procfs::{Current, CurrentSI, KernelStats, Meminfo, WithCurrentSystemInfo as _};
 use runtime::{Foreign, Host, HostReading};
 
@@ -35,9 +35,9 @@ pub struct ProcHost {
     others: HashMap<i32, Other>,
 }
 
-/// Another process with a real-time priority.
+/// A thread of another process with a real-time priority.
 struct Other {
-    process: Process,
+    task: Task,
     name: String,
     priority: u8,
     may: u64,
@@ -76,27 +76,29 @@ impl ProcHost {
         let Ok(all) = all_processes() else { return };
         let own = std::process::id() as i32;
         let mut seen = Vec::new();
-        for process in all.flatten().filter(|process| process.pid != own) {
-            let Ok(stat) = process.stat() else { continue };
+        let others = all.flatten().filter(|process| process.pid != own);
+        let tasks = others.filter_map(|process| process.tasks().ok()).flat_map(|tasks| tasks.flatten());
+        for task in tasks {
+            let Ok(stat) = task.stat() else { continue };
             let policy = stat.policy.unwrap_or(0);
             if ![FIFO, ROUND_ROBIN, DEADLINE].contains(&policy) {
                 continue;
             }
-            seen.push(process.pid);
+            seen.push(task.tid);
             let priority = if policy == DEADLINE { 0 } else { stat.rt_priority.unwrap_or(0) as u8 };
-            let may = allowed(&process);
-            let entry = self.others.entry(process.pid).or_insert_with(|| {
-                let used = used(&process);
-                Other { name: stat.comm.clone(), priority, may, used, process }
+            let may = allowed(&task);
+            let entry = self.others.entry(task.tid).or_insert_with(|| {
+                let used = used(&task);
+                Other { name: stat.comm.clone(), priority, may, used, task }
             });
             (entry.priority, entry.may) = (priority, may);
         }
-        self.others.retain(|pid, _| seen.contains(pid));
+        self.others.retain(|tid, _| seen.contains(tid));
     }
 
     fn burdens(&mut self, length: f32) -> Vec<Foreign> {
         let others = self.others.values_mut().map(|other| {
-            let now = used(&other.process);
+            let now = used(&other.task);
             let before = std::mem::replace(&mut other.used, now);
             let share = now.saturating_sub(before) as f32 * 1e-9 / length.max(1e-3);
             Foreign {
@@ -142,14 +144,14 @@ impl Host for ProcHost {
     }
 }
 
-/// What a process has used of processors (ns).
-fn used(process: &Process) -> u64 {
-    process.schedstat().map_or(0, |stat| stat.sum_exec_runtime)
+/// What a thread has used of processors (ns).
+fn used(task: &Task) -> u64 {
+    task.schedstat().map_or(0, |stat| stat.sum_exec_runtime)
 }
 
-/// The processors on which a process may run, as bits; all where the kernel does not say.
-fn allowed(process: &Process) -> u64 {
-    let lists = process.status().ok().and_then(|status| status.cpus_allowed_list);
+/// The processors on which a thread may run, as bits; all where the kernel does not say.
+fn allowed(task: &Task) -> u64 {
+    let lists = task.status().ok().and_then(|status| status.cpus_allowed_list);
     let bits = lists.into_iter().flatten().flat_map(|(from, to)| from..=to);
     let mask = bits.fold(0u64, |mask, cpu| mask | 1u64 << (cpu & 63));
     if mask == 0 { u64::MAX } else { mask }

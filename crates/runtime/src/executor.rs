@@ -225,6 +225,18 @@ impl Core {
         self.releases.peek().map_or(Time::NEVER, |Reverse((time, _))| *time)
     }
 
+    /// The thread is there from now on: nobody who has not had a step yet was due before.
+    pub(crate) fn begin_at(&mut self, now: Time) {
+        self.looked = self.looked.max(now);
+        for slot in 0..self.seats.len() {
+            let Some(seat) = self.seats[slot].as_deref_mut() else { continue };
+            if !seat.started && seat.next_release < now {
+                seat.next_release = now;
+                self.push_release(now, slot as u32);
+            }
+        }
+    }
+
     /// What the one agent needs of an executor that runs by its deadline.
     pub(crate) fn budget(&self) -> Option<Budget> {
         self.seats.iter().flatten().next()?.timing.budget

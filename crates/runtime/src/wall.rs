@@ -591,6 +591,8 @@ fn run_core(
     };
     let mine = || here.still(cell.owner.keeps(number));
     let mut at = watch.fresh(Time::ZERO);
+    // SAFETY: the core is this thread's own, and the borrow ends here.
+    unsafe { (*core).begin_at(at.time) };
     loop {
         // SAFETY: the core is this thread's own, and the borrow ends here.
         let changes = unsafe { (*core).look_at_door() };

@@ -29,18 +29,22 @@ struct Seen {
     at: Option<Time>,
     /// For how many times as long as usual it is believed: twice as long after each time that it was found to be so still.
     patience: i64,
+    /// When another process took time from its steps last.
+    disturbed: Option<Time>,
     /// Whether it was believed no more, and what it takes now is not seen yet.
     is_tried: bool,
 }
 
 /// An agent that is suspended is tried again no less often than after so many times the usual span.
 const MOST_PATIENCE: i64 = 16;
+/// For so long what was disturbed is among what steps took of late.
+const SETTLES: Duration = Duration::millis(1200);
 /// What takes so much longer than is declared is found to be so still.
 const STILL: f64 = 1.25;
 
 impl Default for Seen {
     fn default() -> Seen {
-        Seen { times: 1.0, at: None, patience: 1, is_tried: false }
+        Seen { times: 1.0, at: None, patience: 1, disturbed: None, is_tried: false }
     }
 }
 
@@ -59,7 +63,10 @@ impl Model {
         for (agent, (resident, seen)) in system.agents.iter_mut().zip(residents) {
             let executor = &census.system.executors[agent.executor];
             // What another process takes from a step is in what the step is said to have taken.
-            if !host.burdens.iter().any(|burden| stands_over(burden, executor)) {
+            if host.burdens.iter().any(|burden| stands_over(burden, executor)) {
+                seen.disturbed = Some(now);
+            }
+            if seen.disturbed.is_none_or(|at| now - at > SETTLES) {
                 look(resident, seen, census.percent, now, params.believes);
             }
             agent.cost = exact(cost_of(resident, 0, seen.times) + census.overhead);
@@ -117,7 +124,7 @@ fn look(resident: &Resident, seen: &mut Seen, percent: i64, now: Time, believes:
             (_, false) => 1,
             (false, true) => seen.patience,
         };
-        *seen = Seen { times, at: Some(now), patience, is_tried: false };
+        *seen = Seen { times, at: Some(now), patience, is_tried: false, ..*seen };
     } else if seen.at.is_some_and(|at| now - at > believes * seen.patience) {
         *seen = Seen { times: 1.0, at: None, is_tried: true, ..*seen };
     }
