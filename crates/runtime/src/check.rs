@@ -264,6 +264,13 @@ impl<'a> Checker<'a> {
             if !kind.and_then(|kind| kind.port(port)).is_some_and(|port| port.options.single) {
                 continue;
             }
+            let sender = wire
+                .from
+                .rsplit_once('.')
+                .and_then(|(agent, port)| self.registry.get(&self.agents.get(agent)?.kind)?.port(port));
+            if sender.is_none_or(|sender| !sender.options.is_ordinary()) {
+                continue;
+            }
             match first.get(wire.to.as_str()) {
                 Some(one) => self.refuse(wire.at, commanded_by_two(one, &wire.from, &wire.to)),
                 None => drop(first.insert(&wire.to, &wire.from)),

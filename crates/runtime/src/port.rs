@@ -61,7 +61,8 @@ pub struct PortOptions {
     pub priorities: &'static str,
     /// The port of the robot to which this one is wired when the plan names a robot for the agent.
     pub robot: Option<&'static str>,
-    /// Whether one sender at most may be wired to it: whoever commands an actuator commands it alone.
+    /// Whether one sender of ordinary messages at most may be wired to it: whoever commands an actuator commands it alone. Those that can
+    /// say something more urgent stand above it.
     pub single: bool,
 }
 
@@ -69,6 +70,11 @@ impl PortOptions {
     /// By value, with normal priority, for no robot, with any number of senders.
     pub const DEFAULT: PortOptions =
         PortOptions { history: 0, rows: 0, priorities: "normal", robot: None, single: false };
+
+    /// Whether nothing that goes out here is more urgent than usual.
+    pub(crate) fn is_ordinary(&self) -> bool {
+        self.priorities().all(|priority| priority <= Priority::Normal)
+    }
 
     pub(crate) fn priorities(&self) -> impl Iterator<Item = Priority> + '_ {
         self.priorities.split(',').filter_map(|name| Priority::named(name.trim()))

@@ -266,6 +266,8 @@ pub(crate) struct Router {
     pub as_declared: bool,
     /// When it was last looked whether somebody has outgrown what it was admitted with.
     grown_at: Time,
+    /// When it was last looked at what steps took of late.
+    windows_at: Time,
     log: LogChoice,
     pub log_shared: Arc<LogShared>,
     robots: Vec<String>,
@@ -307,6 +309,7 @@ impl Router {
             measures: None,
             as_declared: false,
             grown_at: Time(i64::MIN / 2),
+            windows_at: Time(i64::MIN / 2),
             log: LogChoice::default(),
             log_shared: LogShared::new(),
             robots,

@@ -141,6 +141,10 @@ impl Router {
             return;
         }
         let now = self.now;
+        if now - self.windows_at < WINDOW / 10 {
+            return;
+        }
+        self.windows_at = now;
         for known in self.agents.values_mut() {
             if self.executors[known.executor].plan.level().is_some() {
                 known.long_window.look(&known.stats, now, WINDOW);

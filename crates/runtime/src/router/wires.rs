@@ -45,9 +45,10 @@ impl Router {
         if self.find_wire(from, to).is_some() {
             return Err(Refusal::new(format!("{} is already wired to {}", plan.from, plan.to)));
         }
-        if self.agents[&to.0].kind.ports[to.1].options.single {
+        let is_ordinary = |port: PortId| self.agents[&port.0].kind.ports[port.1].options.is_ordinary();
+        if self.agents[&to.0].kind.ports[to.1].options.single && is_ordinary(from) {
             let wires = self.agents[&to.0].wires.iter().filter_map(|id| self.wires.get(id));
-            if let Some(other) = wires.into_iter().find(|wire| wire.to == to) {
+            if let Some(other) = wires.into_iter().find(|wire| wire.to == to && is_ordinary(wire.from)) {
                 return Err(commanded_by_two(&self.plan_of(other).from, &plan.from, &plan.to));
             }
         }
