@@ -3,7 +3,7 @@
 use program::file::{self, Shelf, read_plan, write_plan};
 use proptest::prelude::*;
 use runtime::{
-    AgentPlan, ExecutorPlan, OnDeath, Overload, Plan, QueuePlan, TimedRequest, WireFilter, WirePlan,
+    AgentPlan, ExecutorPlan, Giving, OnDeath, Overload, Plan, QueuePlan, TimedRequest, WireFilter, WirePlan,
 };
 use types::value::{Span, Table, Value};
 use types::{Category, Duration, Priority};
@@ -209,7 +209,12 @@ fn executors() -> impl Strategy<Value = Vec<ExecutorPlan>> {
         named
             .map(|(i, one)| {
                 let name = ["reflex", "own one", "x.y"][i];
-                let Some((priority, cpus, spin)) = one else { return ExecutorPlan::by_deadline(name) };
+                let (priority, cpus, spin) = match one {
+                    Some(one) => one,
+                    // On the first, a usual one, there are agents that the kernel would not take.
+                    None if i == 0 => (None, Vec::new(), 0),
+                    None => return ExecutorPlan::by_deadline(name),
+                };
                 ExecutorPlan { cpus, spin: Duration(spin), ..ExecutorPlan::new(name, priority) }
             })
             .collect()
@@ -237,6 +242,14 @@ fn agents() -> impl Strategy<Value = Vec<AgentPlan>> {
                     on_death: if leave { OnDeath::Leave } else { OnDeath::Restart },
                     hang_after,
                     params,
+                    giving: Giving {
+                        importance: leave.then_some(keep / 2.0),
+                        elasticity: ranged.then_some(keep),
+                        gap_max: ranged.then_some(Duration(gap + 1)),
+                        may_suspend: leave,
+                        is_rigid: ranged,
+                        is_suspended: leave && ranged,
+                    },
                     ..AgentPlan::default()
                 }
             })
