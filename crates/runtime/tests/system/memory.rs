@@ -149,7 +149,7 @@ fn requests() -> Vec<String> {
     .to_vec();
     for kind in FaultKind::ALL.iter().filter(|kind| !matches!(kind, FaultKind::Hang | FaultKind::Panic)) {
         asked.extend(["source", "painter", "source.out", "painter.picture"].iter().filter_map(|target| {
-            let is_of_steps = matches!(kind, FaultKind::Slow);
+            let is_of_steps = matches!(kind, FaultKind::Slow | FaultKind::Heavy);
             (!is_of_steps || !target.contains('.')).then(|| format!("fault {target} {}", kind.name()))
         }));
         asked.extend(["source", "painter"].map(|target| format!("fault {target} ok")));
