@@ -166,7 +166,7 @@ impl Router {
         Duration(longest.0 * percent / 100).max(agent.budget.unwrap_or(Duration::ZERO))
     }
 
-    /// Tells whose steps take longer than what they were admitted with, at once and then each time when it has become a quarter more.
+    /// Tells whose steps take longer than what they were admitted with by a tenth or more, at once and then each time when it has become a quarter more.
     pub(super) fn note_outgrown(&mut self, now: Time) {
         if self.measures.is_none() || self.admission.is_none() || now - self.grown_at < GROWN_EVERY {
             return;
@@ -178,7 +178,7 @@ impl Router {
                 continue;
             };
             let (_, longest) = known.stats.longest();
-            if longest > admitted {
+            if longest > admitted + Duration(admitted.0 / 10) {
                 known.admitted = Some(longest + Duration(longest.0 / 4));
                 grown.push((known.plan.name.clone(), longest, admitted));
             }
