@@ -58,9 +58,14 @@ fn keeps_in_time(run: &Value) -> Result<(), String> {
             None => return Err(format!("the document does not tell what {name} missed")),
         }
     }
-    match run["collisions"].as_u64() {
-        Some(0) => Ok(()),
-        other => Err(format!("collisions: {other:?}")),
+    if run["collisions"] != 0 {
+        return Err(format!("collisions: {}", run["collisions"]));
+    }
+    let runs = run["compared"]["runs"].as_array().ok_or("the document compares nothing")?;
+    let useful: Vec<f64> = runs.iter().filter_map(|run| run["useful"].as_f64()).collect();
+    match useful[..] {
+        [managed, none, ladder] if managed > none && managed > ladder => Ok(()),
+        _ => Err(format!("useful work managed, not managed, with halved rates: {useful:?}")),
     }
 }
 
@@ -151,9 +156,13 @@ mod tests {
                 .iter()
                 .map(|name| json!({"name": name, "missed": if *name == "drive" { missed } else { 0 }}))
                 .collect();
-            json!({"agents": agents, "collisions": 0})
+            let runs = [0.9, 0.8, 0.85].map(|useful| json!({"useful": useful}));
+            json!({"agents": agents, "collisions": 0, "compared": {"runs": runs}})
         };
         assert_eq!(keeps_in_time(&of(0)), Ok(()));
+        let mut worse = of(0);
+        worse["compared"]["runs"][2]["useful"] = json!(0.95);
+        assert!(keeps_in_time(&worse).unwrap_err().contains("0.95"));
         assert_eq!(keeps_in_time(&of(2)).unwrap_err(), "drive missed 2 deadlines");
         assert!(keeps_in_time(&json!({"agents": [], "collisions": 0})).is_err(), "nobody is there");
     }

@@ -6,6 +6,7 @@ use std::sync::atomic::Ordering;
 
 use record::figure::{BandRow, Bands, RateBand, Span};
 use runtime::Plan;
+use serde_json::{Value as Json, json};
 use types::Duration;
 
 use super::knowing::Knowing;
@@ -35,9 +36,10 @@ pub(super) fn run(
     whole: &One<'_>,
     first: &Summary,
     (key, values): &(String, Vec<String>),
-) -> Result<Vec<String>, Failure> {
-    let Some(place) = &whole.place else { return Ok(Vec::new()) };
+) -> Result<Compared, Failure> {
+    let Some(place) = &whole.place else { return Ok(Compared::default()) };
     let mut lines = vec![row(&values[0], first)];
+    let mut documents = vec![document(&values[0], first)];
     let mut bands = Vec::new();
     bands.extend(place.log.as_deref().and_then(|log| band(log, &values[0], first, whole.scenario)));
     for value in &values[1..] {
@@ -67,6 +69,7 @@ pub(super) fn run(
         };
         let summary = one.run(ready)?;
         lines.push(row(value, &summary));
+        documents.push(document(value, &summary));
         bands.extend(own.log.as_deref().and_then(|log| band(log, value, &summary, &scenario)));
     }
     let picture = Bands { bands, spans: spans(&whole.scenario.file.plan), window: None }.draw();
@@ -86,7 +89,20 @@ pub(super) fn run(
         table(&all, 1)
     )];
     said.extend(files.iter().map(|file| format!("               {file}")));
-    Ok(said)
+    Ok(Compared { text: said, document: json!({"entry": key, "runs": documents, "files": files}) })
+}
+
+/// What came out, for people and for programs.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Compared {
+    pub(crate) text: Vec<String>,
+    pub(crate) document: Json,
+}
+
+fn document(value: &str, summary: &Summary) -> Json {
+    let agents = summary.done.iter();
+    let agents = agents.map(|done| json!({"name": done.name, "share": done.share(), "missed": done.missed}));
+    json!({"value": value, "useful": useful(&summary.done), "agents": agents.collect::<Vec<_>>()})
 }
 
 fn row(value: &str, summary: &Summary) -> Vec<String> {

@@ -166,6 +166,13 @@ struct One<'a> {
 
 impl One<'_> {
     fn run(&self, ready: Ready) -> Result<Summary, Failure> {
+        let plays = self.clock == ClockChoice::Wall || self.virtual_processors(&ready).is_some();
+        if !plays && !file::burdens(&ready.plan).is_empty() {
+            let what = "a [burden] takes time of processors, and simulated steps take none here";
+            return Err(
+                Failure::new(what).help("write processors = 2 at the top of the file, or say --processors 2")
+            );
+        }
         let mut plan = ready.plan.clone();
         let firings = self.knowing.map(|knowing| knowing.firings(self.clock, self.limit(&ready)));
         let asked = Asked::of(&mut plan, firings.unwrap_or_default(), self.repeat.as_ref());

@@ -8,6 +8,7 @@ use serde_json::{Value as Json, json};
 use types::{Duration, Time};
 
 use super::asked::{self, Asked};
+use super::compare::Compared;
 use super::judge;
 use super::knowing;
 use super::prepare::Ready;
@@ -80,8 +81,8 @@ pub(crate) struct Summary {
     pub(crate) repeat: Option<Repeated>,
     /// What the agents did whose plan says how important they are.
     pub(crate) done: Vec<Done>,
-    /// Lines on the runs that this one is compared with.
-    pub(crate) compared: Vec<String>,
+    /// The runs that this one is compared with.
+    pub(crate) compared: Compared,
 }
 
 impl Summary {
@@ -143,7 +144,7 @@ impl Summary {
             files: Vec::new(),
             repeat: None,
             done: Vec::new(),
-            compared: Vec::new(),
+            compared: Compared::default(),
         }
     }
 
@@ -266,6 +267,7 @@ impl Summary {
                     "nominal": done.work.nominal, "in_time": done.work.in_time, "quality": done.work.quality,
                 })).collect::<Vec<_>>(),
             })),
+            "compared": self.compared.document,
             "messages": {"sent": self.sent, "dropped": self.dropped, "refused": self.refused},
             "allocations": self.allocations.as_ref().map(|by| json!({
                 "real_time": by.iter().map(|(_, count)| count).sum::<u64>(),
@@ -357,7 +359,7 @@ impl Summary {
                 }
             });
         }
-        self.compared.iter().for_each(|text| line(text.clone()));
+        self.compared.text.iter().for_each(|text| line(text.clone()));
         for (i, file) in self.files.iter().enumerate() {
             line(format!("  {:<12} {}", if i == 0 { "files" } else { "" }, file.display()));
         }
