@@ -364,8 +364,13 @@ impl Core {
         if earliest <= now {
             return false;
         }
-        if seat.put_off != earliest {
-            seat.put_off = earliest;
+        // It is released when it may be, not when the message came.
+        seat.ready_at = Time::NEVER;
+        let is_new = core::mem::replace(&mut seat.put_off, earliest) != earliest;
+        if let Some(since) = self.ready_since.as_mut().and_then(|since| since.get_mut(slot as usize)) {
+            *since = Time::NEVER;
+        }
+        if is_new {
             self.push_release(earliest, slot);
         }
         self.rest_at_queues(slot, Rest::Away);
