@@ -18,12 +18,17 @@ use runtime::{Agent, Census, Fault, Given, HostReading, Input, Manager, Output, 
 use schedule::manage::{Change, Governor, Ladder, Patience, Setting};
 use types::messages::{Grant, Load, Orders};
 use types::params::Params;
+use types::value::{Mistake, Table};
 use types::{Duration, Name, Sequence, Text, Time};
 
 use model::Model;
 
+/// The rules by which it can manage.
+const POLICIES: [&str; 3] = ["elastic", "ladder", "none"];
+
 /// How it manages.
 #[derive(Clone, Debug, Params)]
+#[params(check = whole)]
 pub struct ResourceParams {
     /// By which rule: "elastic" takes from the least important as little as is needed; "ladder" halves the rate of whoever missed a deadline, as other systems do, for comparison; "none" looks on.
     #[param(default = "elastic")]
@@ -77,16 +82,16 @@ enum Rule {
     Ladder(Ladder),
 }
 
-impl Agent for ResourceManager {
-    fn start(&mut self, _: &mut Step) -> Result<(), Fault> {
-        match self.params.policy.as_str() {
-            "elastic" | "ladder" | "none" => Ok(()),
-            other => Err(Fault::of(format!(
-                "the policy of a resource manager is \"elastic\", \"ladder\" or \"none\", not \"{other}\""
-            ))),
-        }
+/// A rule that nobody knows.
+fn whole(params: &ResourceParams, read: &Table) -> Vec<Mistake> {
+    if POLICIES.contains(&params.policy.as_str()) {
+        return Vec::new();
     }
+    let at = read.get("policy").map(|entry| entry.at).unwrap_or_default();
+    vec![Mistake::unknown(at, "policy of a resource manager", &params.policy, POLICIES)]
+}
 
+impl Agent for ResourceManager {
     fn step(&mut self, step: &mut Step) -> Result<(), Fault> {
         if let Some(orders) = self.orders.latest() {
             self.orders_now = orders;
@@ -239,5 +244,24 @@ fn grant(agent: &Resident, given: &Given, cause: &str) -> Grant {
         budget: given.budget.map_or(0.0, Duration::seconds),
         suspended: given.is_suspended,
         cause: Text::new(cause),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use types::value::Value;
+
+    #[test]
+    fn a_rule_that_nobody_knows_is_told_with_the_nearest() {
+        let read = |policy: &str| {
+            let mut table = Table::new();
+            table.set("policy", Value::from(policy));
+            ResourceParams::read(&table, "resource-manager").err().unwrap_or_default()
+        };
+        assert!(POLICIES.iter().all(|policy| read(policy).is_empty()));
+        let wrong = read("elastc");
+        assert_eq!(wrong.len(), 1, "{wrong:?}");
+        assert!(wrong[0].help.as_ref().is_some_and(|help| help.contains("\"elastic\"")), "{wrong:?}");
     }
 }
