@@ -13,6 +13,7 @@
 //! | [`fuzzy`] | terms, hedges, inference |
 //! | [`word`] | commands in words |
 //! | [`fusion`] | one command out of many offers |
+//! | [`coordination`] | the same by priority, by layers, as vectors, or fused |
 //! | [`ring`] | ranges around the robot, of a few sonars or of a laser |
 //! | [`safety`] | how fast is still safe, and where there is room |
 //! | [`wall`] | steering along a wall |
@@ -25,6 +26,7 @@
 extern crate std;
 
 pub mod boundary;
+pub mod coordination;
 pub mod fusion;
 pub mod fuzzy;
 pub mod heading;
