@@ -28,4 +28,4 @@ pub use pose::{FrameTransform, Odometry, Transforms};
 pub use ranges::{DIRECTIONS, Echo, Echoes, LaserScan, Ranges, Risk};
 pub use reasons::{Held, MOST_REASONS, MOST_SITUATIONS, Reason, Reasons, Signal};
 pub use sighting::Sighting;
-pub use task::{Answer, Goal, Manoeuvre, Motion, Progress, Report, Task};
+pub use task::{Answer, Goal, Halt, Manoeuvre, Motion, Progress, Report, Task};

@@ -42,6 +42,14 @@ pub struct Manoeuvre {
     pub angle: f64,
 }
 
+/// A wish that the robot ends what it does, as people and programs ask for it.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Message)]
+#[repr(C)]
+pub struct Halt {
+    /// Why, for whoever reads the log.
+    pub why: Text<63>,
+}
+
 /// What becomes of a request.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Message)]
 #[repr(C)]
