@@ -153,12 +153,12 @@ impl Desk {
     }
 
     fn goal(&mut self, params: &NavigationParams, goal: &Goal, now: Time) -> Result<Task, &'static str> {
-        let Goal { x, y, heading, turned, dock, speed, within, mode } = *goal;
-        if ![x, y, heading, speed, within].iter().all(|number| number.is_finite()) {
+        let Goal { x, y, heading, turned, dock, speed, seconds, mode } = *goal;
+        if ![x, y, heading, speed, seconds].iter().all(|number| number.is_finite()) {
             return Err("a goal is made of numbers");
         }
-        if speed < 0.0 || within < 0.0 {
-            return Err("speed and within are positive, or zero for the robot's own");
+        if speed < 0.0 || seconds < 0.0 {
+            return Err("speed and seconds are positive, or zero for the robot's own");
         }
         let here = self.pose.map_or(Pose::default(), |(pose, _)| pose);
         if (x - here.x).hypot(y - here.y) > params.farthest {
@@ -179,7 +179,7 @@ impl Desk {
             target: Pose { x, y, heading },
             turned: turned || dock,
             linear: speed,
-            seconds: if within > 0.0 { within } else { params.within.seconds() },
+            seconds: if seconds > 0.0 { seconds } else { params.within.seconds() },
             ..Task::default()
         }))
     }
@@ -285,7 +285,7 @@ mod tests {
         let first = desk.goal(&params, &goal(3.0, 1.0), at(0)).unwrap();
         assert_eq!((first.number, first.motion, first.mode.as_str()), (1, Motion::Goto, "goto+avoid"));
         assert_eq!((first.target.x, first.seconds, first.turned), (3.0, 300.0, false));
-        let path = Goal { mode: "path".into(), within: 20.0, ..goal(3.0, 1.0) };
+        let path = Goal { mode: "path".into(), seconds: 20.0, ..goal(3.0, 1.0) };
         let second = desk.goal(&params, &path, at(0)).unwrap();
         assert_eq!((second.number, second.motion, second.seconds), (2, Motion::Path, 20.0));
         let dock = desk.goal(&params, &Goal { dock: true, ..goal(1.0, 1.0) }, at(0)).unwrap();

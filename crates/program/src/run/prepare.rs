@@ -8,7 +8,7 @@ use hardware::gate::Counts;
 use hardware::robot::{CYCLE, RobotParams};
 use hardware::simulated::{self, Truth};
 use hardware::{Berth, ClockKind, Gate, Latch, RobotDescription, Spec};
-use runtime::{Admission, Params as _, Plan, Registry};
+use runtime::{Admission, Params as _, Plan, PortInfo, Registry};
 use sim::{Drawn, Goal, Model, Vary, WorldPlan};
 use types::Duration;
 use types::value::{Mistake, Row, Span, Table};
@@ -205,6 +205,12 @@ const READINGS: [(&str, Every); 9] = [
 ];
 
 impl Ready {
+    /// A port by its name.
+    pub(crate) fn port(&self, name: &str) -> Option<&PortInfo> {
+        let (agent, port) = name.rsplit_once('.')?;
+        self.registry.get(&self.plan.agent(agent)?.kind)?.port(port)
+    }
+
     /// The time between two readings at a port of a robot. What was recorded comes no more often than its gate looks.
     pub(crate) fn pace(&self, port: &str) -> Option<Duration> {
         let (robot, port) = port.rsplit_once('.')?;

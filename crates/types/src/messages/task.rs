@@ -20,9 +20,9 @@ pub struct Goal {
     pub dock: bool,
     /// The highest speed on the way (m/s); zero for the robot's own.
     pub speed: f64,
-    /// How long it may take (s); zero for as long as the navigator gives by itself.
-    pub within: f64,
-    /// The mode in which to go there; empty for the navigator's choice.
+    /// How long it may take (s); zero for as long as the navigation module gives by itself.
+    pub seconds: f64,
+    /// The mode in which to go there; empty for the navigation module's choice.
     pub mode: Name,
 }
 
