@@ -10,6 +10,7 @@
 //! | [`heading`] | how far the body turned, from a gyro and the wheels |
 //! | [`motor`] | how a wheel under speed control follows its set point |
 //! | [`limits`] | what of a wish can be driven |
+//! | [`steering`] | closed-loop steering to a pose |
 //! | [`fuzzy`] | terms, hedges, inference |
 //! | [`word`] | commands in words |
 //! | [`fusion`] | one command out of many offers |
@@ -35,6 +36,7 @@ pub mod odometry;
 pub mod pursuit;
 pub mod ring;
 pub mod safety;
+pub mod steering;
 pub mod wall;
 pub mod word;
 
