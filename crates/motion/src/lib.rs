@@ -10,6 +10,7 @@
 //! | [`heading`] | how far the body turned, from a gyro and the wheels |
 //! | [`motor`] | how a wheel under speed control follows its set point |
 //! | [`limits`] | what of a wish can be driven |
+//! | [`profile`] | the fastest motion along an axis within velocity, acceleration and jerk |
 //! | [`steering`] | closed-loop steering to a pose |
 //! | [`fuzzy`] | terms, hedges, inference |
 //! | [`word`] | commands in words |
@@ -33,6 +34,7 @@ pub mod kinematics;
 pub mod limits;
 pub mod motor;
 pub mod odometry;
+pub mod profile;
 pub mod pursuit;
 pub mod ring;
 pub mod safety;
