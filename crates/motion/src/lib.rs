@@ -12,6 +12,7 @@
 //! | [`limits`] | what of a wish can be driven |
 //! | [`profile`] | the fastest motion along an axis within velocity, acceleration and jerk |
 //! | [`steering`] | closed-loop steering to a pose |
+//! | [`trajectory`] | staying with a pose that moves |
 //! | [`fuzzy`] | terms, hedges, inference |
 //! | [`word`] | commands in words |
 //! | [`fusion`] | one command out of many offers |
@@ -39,6 +40,7 @@ pub mod pursuit;
 pub mod ring;
 pub mod safety;
 pub mod steering;
+pub mod trajectory;
 pub mod wall;
 pub mod word;
 

@@ -175,7 +175,7 @@ impl Profile {
     /// Over `distance` (m), which may be negative, from the velocity `start` to the velocity `end` (m/s). Both have the sign of the
     /// distance, or are zero.
     pub fn between(bounds: Bounds, distance: f64, start: f64, end: f64) -> Result<Profile, Unfit> {
-        if !bounds.make_sense() || !(distance.is_finite() && start.is_finite() && end.is_finite()) {
+        if !(bounds.make_sense() && distance.is_finite() && start.is_finite() && end.is_finite()) {
             return Err(Unfit::Nonsense);
         }
         let sign = if distance < 0.0 || (distance == 0.0 && start + end < 0.0) { -1.0 } else { 1.0 };
@@ -198,7 +198,7 @@ impl Profile {
 
     /// The change of velocity from `start` to `end` (m/s) alone, in the least time. Both have one sign, or are zero.
     pub fn ramp(bounds: Bounds, start: f64, end: f64) -> Result<Profile, Unfit> {
-        if !bounds.make_sense() || !(start.is_finite() && end.is_finite()) {
+        if !(bounds.make_sense() && start.is_finite() && end.is_finite()) {
             return Err(Unfit::Nonsense);
         }
         if start * end < 0.0 {
