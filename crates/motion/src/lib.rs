@@ -13,6 +13,7 @@
 //! | [`profile`] | the fastest motion along an axis within velocity, acceleration and jerk |
 //! | [`steering`] | closed-loop steering to a pose |
 //! | [`trajectory`] | staying with a pose that moves |
+//! | [`manoeuvre`] | a velocity for a time, a distance, an angle, a point |
 //! | [`fuzzy`] | terms, hedges, inference |
 //! | [`word`] | commands in words |
 //! | [`fusion`] | one command out of many offers |
@@ -33,6 +34,7 @@ pub mod fuzzy;
 pub mod heading;
 pub mod kinematics;
 pub mod limits;
+pub mod manoeuvre;
 pub mod motor;
 pub mod odometry;
 pub mod profile;
