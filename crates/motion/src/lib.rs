@@ -8,6 +8,7 @@
 //! | [`kinematics`] | wheel speeds for a motion of the body, and back |
 //! | [`odometry`] | where the body is, from wheel counters |
 //! | [`heading`] | how far the body turned, from a gyro and the wheels |
+//! | [`blend`] | where the body is on the map, without jumps, from odometry and a localizer |
 //! | [`motor`] | how a wheel under speed control follows its set point |
 //! | [`limits`] | what of a wish can be driven |
 //! | [`profile`] | the fastest motion along an axis within velocity, acceleration and jerk |
@@ -28,6 +29,7 @@
 #[cfg(test)]
 extern crate std;
 
+pub mod blend;
 pub mod boundary;
 pub mod fusion;
 pub mod fuzzy;
