@@ -13,10 +13,11 @@
 //! rest ← rest − min(|rest| (1 − exp(−dt/τ)), r dt) · rest/|rest|
 //! ```
 //!
-//! So between two steps the pose moves by what odometry says and at most r dt more, however far it was put. The same low-pass averages
-//! the localizer's noise: with one correction each T its variance falls to (1 − q)/(1 + q), with q = exp(−T/τ).
+//! So between two steps the pose moves by what odometry says and at most r dt more, however far it was put, up to a bound: a rest beyond
+//! that is no correction but news (the wheels slip, somebody carried the body), and what is beyond counts at once. The same low-pass
+//! averages the localizer's noise: with one correction each T its variance falls to (1 − q)/(1 + q), with q = exp(−T/τ).
 
-use libm::{exp, fabs, fmin};
+use libm::{exp, fabs, fmax, fmin};
 use types::geometry::wrap;
 use types::{Point, Pose};
 
@@ -29,15 +30,25 @@ pub struct Parameters {
     pub linear_rate: f64,
     /// Highest rate of the heading (rad/s).
     pub angular_rate: f64,
+    /// Most of the position that may be left to come in (m).
+    pub linear_rest: f64,
+    /// Most of the heading that may be left to come in (rad).
+    pub angular_rest: f64,
 }
 
 impl Default for Parameters {
     /// For corrections every 0.2 s.
     ///
     /// 0.3 s average the noise to 0.6 of its size, and end well before a goal is reached. A decimetre in a second and 20° in a second are
-    /// less than what the body itself does.
+    /// less than what the body itself does. 0.3 m and 30° are more than a localizer that knows where it is can be wrong by.
     fn default() -> Parameters {
-        Parameters { time_constant: 0.3, linear_rate: 0.1, angular_rate: 0.35 }
+        Parameters {
+            time_constant: 0.3,
+            linear_rate: 0.1,
+            angular_rate: 0.35,
+            linear_rest: 0.3,
+            angular_rest: 0.5,
+        }
     }
 }
 
@@ -64,9 +75,11 @@ impl Blend {
         }
         let before = self.pose();
         self.map_from_odometry = map_from_odometry;
-        let target = map_from_odometry.then(self.odometry);
-        self.rest = before.position() - target.position();
-        self.rest_heading = wrap(before.heading - target.heading);
+        let (target, p) = (self.target(), self.parameters);
+        let rest = before.position() - target.position();
+        self.rest = rest * (p.linear_rest / fmax(rest.norm(), p.linear_rest));
+        let turned = wrap(before.heading - target.heading);
+        self.rest_heading = fmin(fmax(turned, -p.angular_rest), p.angular_rest);
         true
     }
 
@@ -88,12 +101,17 @@ impl Blend {
 
     /// Where the body is in the map.
     pub fn pose(&self) -> Pose {
-        let target = self.map_from_odometry.then(self.odometry);
+        let target = self.target();
         Pose {
             x: target.x + self.rest.x,
             y: target.y + self.rest.y,
             heading: wrap(target.heading + self.rest_heading),
         }
+    }
+
+    /// Where the body is in the map as the last correction has it, all at once.
+    pub fn target(&self) -> Pose {
+        self.map_from_odometry.then(self.odometry)
     }
 
     /// How much of the corrections has not come in yet: of the position (m) and of the heading (rad).
@@ -139,7 +157,8 @@ mod tests {
 
     #[test]
     fn a_large_correction_comes_in_at_its_rate() {
-        let mut blend = Blend::new(Parameters::default(), Pose::default(), Pose::default());
+        let p = Parameters { linear_rest: 2.0, angular_rest: 3.0, ..Parameters::default() };
+        let mut blend = Blend::new(p, Pose::default(), Pose::default());
         blend.correct(Pose::new(1.0, 0.0, 2.0));
         for _ in 0..50 {
             blend.step(Pose::default(), DT);
@@ -169,6 +188,13 @@ mod tests {
     }
 
     #[test]
+    fn what_is_beyond_the_bound_counts_at_once() {
+        let mut blend = Blend::new(Parameters::default(), Pose::default(), Pose::default());
+        blend.correct(Pose::new(1.0, 0.0, -2.0));
+        assert!(fabs(blend.pose().x - 0.7) < 1e-12 && fabs(blend.pose().heading + 1.5) < 1e-12, "{blend:?}");
+    }
+
+    #[test]
     fn nonsense_is_left_out() {
         let mut blend = Blend::new(Parameters::default(), Pose::default(), Pose::new(1.0, 0.0, 0.0));
         assert!(!blend.correct(Pose::new(f64::NAN, 0.0, 0.0)));
@@ -179,7 +205,7 @@ mod tests {
         #[test]
         fn the_pose_never_jumps(seed in 0u64..1000, size in 0f64..2., speed in -1f64..1., turn in -2f64..2.) {
             let draws = Stream::new(seed, "corrections");
-            let p = Parameters::default();
+            let p = Parameters { linear_rest: 20.0, angular_rest: 4.0, ..Parameters::default() };
             let mut odometry = Pose::new(3.0, -2.0, 1.0);
             let mut blend = Blend::new(p, Pose::default(), odometry);
             let mut before = blend.pose();

@@ -14,6 +14,7 @@
 //! | [`profile`] | the fastest motion along an axis within velocity, acceleration and jerk |
 //! | [`steering`] | closed-loop steering to a pose |
 //! | [`trajectory`] | staying with a pose that moves |
+//! | [`goto`] | going to a point, a pose or a dock |
 //! | [`manoeuvre`] | a velocity for a time, a distance, an angle, a point |
 //! | [`fuzzy`] | terms, hedges, inference |
 //! | [`word`] | commands in words |
@@ -33,6 +34,7 @@ pub mod blend;
 pub mod boundary;
 pub mod fusion;
 pub mod fuzzy;
+pub mod goto;
 pub mod heading;
 pub mod kinematics;
 pub mod limits;

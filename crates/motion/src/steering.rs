@@ -239,6 +239,11 @@ impl Steering {
         Steering { parameters, last: None, rotating: false, backward: false }
     }
 
+    /// The same, with nothing remembered: for another goal.
+    pub const fn forgotten(&self) -> Steering {
+        Steering::new(self.parameters)
+    }
+
     /// The order for a body at `pose` on the way to `goal`, both given in one frame. What is not finite stands still.
     pub fn step(&mut self, pose: Pose, goal: Pose) -> Order {
         let p = self.parameters;
