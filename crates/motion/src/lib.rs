@@ -16,6 +16,7 @@
 //! | [`trajectory`] | staying with a pose that moves |
 //! | [`goto`] | going to a point, a pose or a dock |
 //! | [`manoeuvre`] | a velocity for a time, a distance, an angle, a point |
+//! | [`track`] | following a path |
 //! | [`fuzzy`] | terms, hedges, inference |
 //! | [`word`] | commands in words |
 //! | [`fusion`] | one command out of many offers |
@@ -46,6 +47,7 @@ pub mod pursuit;
 pub mod ring;
 pub mod safety;
 pub mod steering;
+pub mod track;
 pub mod trajectory;
 pub mod wall;
 pub mod word;
