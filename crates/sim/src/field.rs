@@ -472,7 +472,7 @@ impl Field {
                 for &index in &self.bodies_in[cell] {
                     let body = &self.bodies[index as usize];
                     if index != skip && body.present {
-                        let (distance, point) = body.solid.from_point(centre);
+                        let (distance, point) = body.solid.gap_to_point(centre);
                         offer(point, distance);
                     }
                 }
@@ -509,17 +509,19 @@ impl Field {
                 let faces = self.faces_of(cell).iter().map(|&index| &self.faces[index as usize]);
                 faces
                     .filter(|face| face.low < height)
-                    .for_each(|face| offer(this.from_segment(&face.segment)));
+                    .for_each(|face| offer(this.gap_to_segment(&face.segment)));
                 let posts = self.posts_of(cell).iter().map(|&index| &self.posts[index as usize]);
-                posts.filter(|post| post.low < height).for_each(|post| offer(this.from_circle(post.circle)));
+                posts
+                    .filter(|post| post.low < height)
+                    .for_each(|post| offer(this.gap_to_circle(post.circle)));
             }
             if flags & HAS_BODY != 0 {
                 for &index in self.bodies_in[cell].iter().filter(|&&index| index != skip) {
                     let body = &self.bodies[index as usize];
                     if body.present {
                         offer(match &body.solid {
-                            Solid::Round(circle) => this.from_circle(*circle),
-                            Solid::Square(other) => this.from_rectangle(other),
+                            Solid::Round(circle) => this.gap_to_circle(*circle),
+                            Solid::Square(other) => this.gap_to_rectangle(other),
                         });
                     }
                 }
@@ -668,7 +670,7 @@ mod tests {
                 best = best.min(post.circle.centre.distance(centre) - post.circle.radius);
             }
             for body in field.bodies.iter().filter(|body| body.present) {
-                best = best.min(body.solid.from_point(centre).0);
+                best = best.min(body.solid.gap_to_point(centre).0);
             }
             proptest::prop_assert!((found - best).abs() < 1e-12, "{} {}", found, best);
         }
@@ -682,15 +684,15 @@ mod tests {
             let found = field.clearance(&Solid::Square(this), limit, 0.5, NOBODY).map_or(limit, |near| near.distance);
             let mut best = limit;
             for face in &field.faces {
-                best = best.min(this.from_segment(&face.segment).0);
+                best = best.min(this.gap_to_segment(&face.segment).0);
             }
             for post in &field.posts {
-                best = best.min(this.from_circle(post.circle).0);
+                best = best.min(this.gap_to_circle(post.circle).0);
             }
             for body in field.bodies.iter().filter(|body| body.present) {
                 best = best.min(match &body.solid {
-                    Solid::Round(circle) => this.from_circle(*circle).0,
-                    Solid::Square(other) => this.from_rectangle(other).0,
+                    Solid::Round(circle) => this.gap_to_circle(*circle).0,
+                    Solid::Square(other) => this.gap_to_rectangle(other).0,
                 });
             }
             proptest::prop_assert!((found - best).abs() < 1e-12, "{} {}", found, best);

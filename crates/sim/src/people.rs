@@ -167,9 +167,9 @@ impl Walker {
             }
             shape => {
                 let body = shape.solid(robot.truth.pose);
-                let distance = body.from_point(next).0;
+                let distance = body.gap_to_point(next).0;
                 let keep = self.plan.radius + POLITE;
-                distance >= keep || (self.present && distance > body.from_point(self.at).0)
+                distance >= keep || (self.present && distance > body.gap_to_point(self.at).0)
             }
         })
     }

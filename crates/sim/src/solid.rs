@@ -66,7 +66,7 @@ impl Rectangle {
     }
 
     /// How far a point in the frame of the rectangle is from it (m), and the point of the rectangle nearest to it.
-    fn from_local(&self, point: Point) -> Gap {
+    fn gap_inside(&self, point: Point) -> Gap {
         let Point { x: a, y: b } = self.half;
         let on = Point::new(point.x.clamp(-a, a), point.y.clamp(-b, b));
         if on != point {
@@ -83,14 +83,14 @@ impl Rectangle {
     }
 
     /// How far a point is from the rectangle (m), negative inside, and the point of its border nearest to it.
-    pub(crate) fn from_point(&self, point: Point) -> Gap {
-        let (distance, on) = self.from_local(self.local(point));
+    pub(crate) fn gap_to_point(&self, point: Point) -> Gap {
+        let (distance, on) = self.gap_inside(self.local(point));
         (distance, self.world(on))
     }
 
     /// How far a circle is from the rectangle (m), and the point of the circle nearest to it.
-    pub(crate) fn from_circle(&self, circle: Circle) -> Gap {
-        let (distance, on) = self.from_point(circle.centre);
+    pub(crate) fn gap_to_circle(&self, circle: Circle) -> Gap {
+        let (distance, on) = self.gap_to_point(circle.centre);
         let way = on - circle.centre;
         let length = hypot(way.x, way.y);
         let point = if length > 0.0 { circle.centre + way * (circle.radius / length) } else { on };
@@ -98,15 +98,15 @@ impl Rectangle {
     }
 
     /// How far a segment is from the rectangle (m), and the point of the segment nearest to it.
-    pub(crate) fn from_segment(&self, segment: &Segment) -> Gap {
+    pub(crate) fn gap_to_segment(&self, segment: &Segment) -> Gap {
         let (from, to) = (self.local(segment.a), self.local(segment.b()));
         if let Some(chord) = self.chord(from, to) {
-            let (depth, _) = self.from_local(chord);
+            let (depth, _) = self.gap_inside(chord);
             return (depth.min(0.0), self.world(chord));
         }
         let mut best = (f64::INFINITY, from);
         for end in [from, to] {
-            let (distance, _) = self.from_local(end);
+            let (distance, _) = self.gap_inside(end);
             if distance < best.0 {
                 best = (distance, end);
             }
@@ -142,13 +142,13 @@ impl Rectangle {
     }
 
     /// How far another rectangle is from this one (m), and its point nearest to this one.
-    pub(crate) fn from_rectangle(&self, other: &Rectangle) -> Gap {
+    pub(crate) fn gap_to_rectangle(&self, other: &Rectangle) -> Gap {
         // A side of the other that crosses this one, or lies in it, has a negative distance by itself.
-        let inside = other.from_point(self.middle);
+        let inside = other.gap_to_point(self.middle);
         if inside.0 < 0.0 {
             return inside;
         }
-        let gaps = other.sides().map(|side| self.from_segment(&side));
+        let gaps = other.sides().map(|side| self.gap_to_segment(&side));
         gaps.into_iter()
             .fold((f64::INFINITY, other.middle), |best, gap| if gap.0 < best.0 { gap } else { best })
     }
@@ -222,10 +222,10 @@ impl Solid {
 
     /// How far a point is from it (m), negative inside, and the point of its border nearest to the point.
     #[inline]
-    pub(crate) fn from_point(&self, point: Point) -> Gap {
+    pub(crate) fn gap_to_point(&self, point: Point) -> Gap {
         match self {
             Solid::Round(circle) => circle.gap(point),
-            Solid::Square(rectangle) => rectangle.from_point(point),
+            Solid::Square(rectangle) => rectangle.gap_to_point(point),
         }
     }
 }
@@ -277,7 +277,7 @@ mod tests {
         ) {
             let a = Point::new(x, y);
             let segment = Segment::new(a, a + Point::polar(length, angle));
-            let (distance, point) = it.from_segment(&segment);
+            let (distance, point) = it.gap_to_segment(&segment);
             let sampled = samples(&it)
                 .into_iter()
                 .map(|p| segment.nearest(p).distance(p))
@@ -287,24 +287,24 @@ mod tests {
             prop_assert!(sampled <= distance.max(0.0) + fineness(&it), "{} {}", sampled, distance);
             prop_assert!(segment.nearest(point).distance(point) < 1e-9, "the point lies on the segment");
             if distance > 0.0 {
-                prop_assert!((it.from_point(point).0 - distance).abs() < 1e-9);
+                prop_assert!((it.gap_to_point(point).0 - distance).abs() < 1e-9);
             }
         }
 
         #[test]
         fn the_distance_of_rectangles_is_that_of_a_dense_sampling(it in rectangles(), other in rectangles()) {
-            let (distance, point) = it.from_rectangle(&other);
+            let (distance, point) = it.gap_to_rectangle(&other);
             let sampled =
-                samples(&other).into_iter().map(|p| it.from_point(p).0).fold(f64::INFINITY, f64::min);
+                samples(&other).into_iter().map(|p| it.gap_to_point(p).0).fold(f64::INFINITY, f64::min);
             if distance > 0.0 {
                 prop_assert!(sampled >= distance - 1e-12 && sampled <= distance + fineness(&other));
-                prop_assert!(other.from_point(point).0.abs() < 1e-9, "the point lies on its border");
-                prop_assert!((it.from_point(point).0 - distance).abs() < 1e-9);
+                prop_assert!(other.gap_to_point(point).0.abs() < 1e-9, "the point lies on its border");
+                prop_assert!((it.gap_to_point(point).0 - distance).abs() < 1e-9);
             } else {
                 prop_assert!(sampled <= fineness(&other), "{} {}", sampled, distance);
             }
             // Who is asked makes no difference.
-            let back = other.from_rectangle(&it).0;
+            let back = other.gap_to_rectangle(&it).0;
             prop_assert!((back - distance).abs() < 1e-9 || (back <= 0.0 && distance <= 0.0), "{} {}", back, distance);
         }
 
@@ -313,7 +313,7 @@ mod tests {
             it in rectangles(), x in -3f64..3., y in -3f64..3., radius in 0.01f64..1.
         ) {
             let circle = Circle { centre: Point::new(x, y), radius };
-            let (distance, point) = it.from_circle(circle);
+            let (distance, point) = it.gap_to_circle(circle);
             let sampled = samples(&it)
                 .into_iter()
                 .map(|p| p.distance(circle.centre) - radius)
@@ -328,7 +328,7 @@ mod tests {
             it in rectangles(), x in -4f64..4., y in -4f64..4., angle in 0f64..TAU
         ) {
             let (origin, direction) = (Point::new(x, y), Point::polar(1.0, angle));
-            prop_assume!(it.from_point(origin).0 > 1e-6);
+            prop_assume!(it.gap_to_point(origin).0 > 1e-6);
             let met = it.meet(origin, direction, 20.0);
             let by_sides = it.sides().into_iter().filter_map(|side| Some((side.meet(origin, direction, 20.0)?, side.normal)));
             let best = by_sides.fold(None, |best: Option<(f64, Point)>, hit| {
