@@ -15,6 +15,10 @@
 //! | [`image_tracker`] | HSI picture, head | the target, wishes for feet and head |
 //! | [`recogniser`] | a picture, head | whether a thing of a colour and shape is there, and where |
 //! | [`path_planner`] | ranges, odometry | a way to a place, and how good it is |
+//! | [`goto`] | a task, odometry, the pose of a localizer | a wish to steer to a point, a pose or a dock |
+//! | [`mover`] | a task, odometry | a wish to drive a distance, an angle, a velocity for a time |
+//! | [`path_follower`] | a task, a path, odometry | a wish to drive along the path |
+//! | [`emergency_stop`] | scan, ranges, how the robot moves | a bound that ramps it down before what it would meet |
 //! | [`navigation`] | goals and manoeuvres of people and programs | tasks, and what becomes of them |
 //! | [`process_supervisor`] | tasks, who lives | the mode: who is heard, and how |
 //! | [`real_time_supervisor`] | modes, tasks, reports of actions | the same for the real-time side, together; standing when one is silent |
@@ -27,16 +31,21 @@
 //! Nothing here knows a simulator or a driver: a robot's ports are wired by the names that stand at the agents' ports.
 #![forbid(unsafe_code)]
 
+mod action;
 pub mod camera;
 pub mod coordinator;
 pub mod decision_maker;
 pub mod drive;
+pub mod emergency_stop;
+pub mod goto;
 pub mod head;
 pub mod image_tracker;
 pub mod laser;
 pub mod lookout;
+pub mod mover;
 pub mod navigation;
 pub mod odometry;
+pub mod path_follower;
 pub mod path_planner;
 pub mod process_supervisor;
 pub mod real_time_supervisor;
@@ -52,12 +61,16 @@ pub use camera::Camera;
 pub use coordinator::Coordinator;
 pub use decision_maker::DecisionMaker;
 pub use drive::DriveBase;
+pub use emergency_stop::EmergencyStopAction;
+pub use goto::GotoAction;
 pub use head::PanTilt;
 pub use image_tracker::ImageTracker;
 pub use laser::Laser;
 pub use lookout::Lookout;
+pub use mover::MoveAction;
 pub use navigation::Navigation;
 pub use odometry::DeadReckoning;
+pub use path_follower::PathFollower;
 pub use path_planner::PathPlanner;
 pub use process_supervisor::ProcessSupervisor;
 pub use real_time_supervisor::RealTimeSupervisor;
@@ -80,6 +93,10 @@ pub fn registry() -> runtime::Registry {
         ImageTracker,
         Recogniser,
         PathPlanner,
+        GotoAction,
+        MoveAction,
+        PathFollower,
+        EmergencyStopAction,
         Navigation,
         ProcessSupervisor,
         RealTimeSupervisor,
@@ -110,6 +127,10 @@ mod tests {
             "image-tracker",
             "recogniser",
             "path-planner",
+            "goto",
+            "move",
+            "path-follower",
+            "emergency-stop",
             "navigation",
             "process-supervisor",
             "real-time-supervisor",

@@ -13,6 +13,7 @@ mod pose;
 mod ranges;
 mod reasons;
 mod sighting;
+mod stop;
 mod task;
 
 pub use body::{Battery, Bumper, Gyro, Head, WheelTicks};
@@ -28,4 +29,5 @@ pub use pose::{FrameTransform, Odometry, Transforms};
 pub use ranges::{DIRECTIONS, Echo, Echoes, LaserScan, Ranges, Risk};
 pub use reasons::{Held, MOST_REASONS, MOST_SITUATIONS, Reason, Reasons, Signal};
 pub use sighting::Sighting;
+pub use stop::{EmergencyStop, StopKind};
 pub use task::{Answer, Goal, Halt, Manoeuvre, Motion, Progress, Report, Task};
