@@ -22,6 +22,7 @@
 //! | [`fusion`] | one command out of many offers |
 //! | [`ring`] | ranges around the robot, of a few sonars or of a laser |
 //! | [`safety`] | how fast is still safe, and where there is room |
+//! | [`stop`] | how speed falls in a hard stop and in a soft one, and when a soft one ends |
 //! | [`wall`] | steering along a wall |
 //! | [`boundary`] | which ways a body fits through, and which of them is along the wall |
 //! | [`pursuit`] | following what a camera on a turning head sees |
@@ -47,6 +48,7 @@ pub mod pursuit;
 pub mod ring;
 pub mod safety;
 pub mod steering;
+pub mod stop;
 pub mod track;
 pub mod trajectory;
 pub mod wall;
