@@ -289,7 +289,8 @@ impl Goto {
         }
     }
 
-    /// Takes what the localizer found: the pose of odometry's frame on the map. What is not finite is left out, and `false` told.
+    /// Takes what the localizer found: the pose of odometry's frame on the map, of where both had the body at one and the same time; how old
+    /// that is matters little then. What is not finite is left out, and `false` told.
     pub fn correct(&mut self, map_from_odometry: Pose) -> bool {
         self.blend.correct(map_from_odometry)
     }
