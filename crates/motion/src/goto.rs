@@ -27,7 +27,7 @@
 //! It holds for steps of 5 to 50 ms and corrections more often than the time to stop at the goal (about 1 s).
 
 use crate::blend::{self, Blend};
-use crate::kinematics::Twist;
+use crate::kinematics::{self, Twist};
 use crate::limits::{Forward, Limits, limit};
 use crate::steering::{self, Mode, Polar, Steering};
 use crate::trajectory::{self, Gains};
@@ -293,6 +293,13 @@ impl Goto {
     /// that is matters little then. What is not finite is left out, and `false` told.
     pub fn correct(&mut self, map_from_odometry: Pose) -> bool {
         self.blend.correct(map_from_odometry)
+    }
+
+    /// Tells that something else drove it since the last step, and that it moves by `present` now (a coordinator chose another, a safety
+    /// monitor held it): the next order goes on from there, and patience begins anew. The time for all runs on.
+    pub fn yielded(&mut self, present: Twist) {
+        self.last = if kinematics::is_finite(present) { present } else { Twist::ZERO };
+        self.progress = Progress::NONE;
     }
 
     /// The next order, for a body that odometry has at `odometry`, `dt` (s) after the one before.

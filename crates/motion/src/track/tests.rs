@@ -148,6 +148,15 @@ fn curve_obstacle_and_end_slow_it_in_proportion() {
 }
 
 #[test]
+fn it_goes_on_from_what_something_else_drove() {
+    let path = [Point::default(), Point::new(5.0, 0.0)];
+    let mut track = Track::new(parameters(), Twist::ZERO);
+    track.yielded(Twist::new(0.2, 0.0));
+    let report = track.step(&path, Pose::default(), f64::INFINITY, STEP);
+    assert!(fabs(report.twist.linear - 0.21) < 1e-12, "{report:?}");
+}
+
+#[test]
 fn without_a_path_or_a_pose_it_brakes() {
     let mut track = Track::new(parameters(), Twist::new(0.3, 0.0));
     let report = track.step(&[], Pose::default(), f64::INFINITY, STEP);
