@@ -22,7 +22,7 @@
 //! | [`fusion`] | one command out of many offers |
 //! | [`ring`] | ranges around the robot, of a few sonars or of a laser |
 //! | [`safety`] | how fast is still safe, and where there is room |
-//! | [`stop`] | how speed falls in a hard stop and in a soft one, and when a soft one ends |
+//! | [`stop`] | how speed falls in a hard stop and in a soft one |
 //! | [`wall`] | steering along a wall |
 //! | [`boundary`] | which ways a body fits through, and which of them is along the wall |
 //! | [`pursuit`] | following what a camera on a turning head sees |
