@@ -20,6 +20,7 @@
 //! | [`fuzzy`] | terms, hedges, inference |
 //! | [`word`] | commands in words |
 //! | [`fusion`] | one command out of many offers |
+//! | [`coordination`] | the same by priority, by layers, as vectors, or fused |
 //! | [`ring`] | ranges around the robot, of a few sonars or of a laser |
 //! | [`safety`] | how fast is still safe, and where there is room |
 //! | [`stop`] | how speed falls in a hard stop and in a soft one |
@@ -34,6 +35,7 @@ extern crate std;
 
 pub mod blend;
 pub mod boundary;
+pub mod coordination;
 pub mod fusion;
 pub mod fuzzy;
 pub mod goto;
