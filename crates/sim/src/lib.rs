@@ -5,7 +5,7 @@
 //! | what a world file says | [`plan`] |
 //! | what a robot is made of | [`model`] |
 //! | the running world | [`simulator`], with `robot` (motion, contacts) and `people` (scripts) |
-//! | sensors | `sonar`, [`laser`], [`camera`]; all are methods of [`Simulator`] |
+//! | sensors | `sonar`, [`laser`], [`camera`], [`landmarks`]; all are methods of [`Simulator`] |
 //! | what makes a run a success | [`goal`] |
 //! | what a seed changes | [`vary`], with [`free_way`] |
 //! | plain data to draw | [`snapshot`] |
@@ -19,6 +19,7 @@ pub mod colour;
 mod field;
 pub mod free_way;
 pub mod goal;
+pub mod landmarks;
 pub mod laser;
 pub mod model;
 mod outline;

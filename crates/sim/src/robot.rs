@@ -82,6 +82,8 @@ pub(crate) struct Streams {
     pub laser: Stream,
     pub gyro: Stream,
     pub camera: Stream,
+    pub landmarks: Stream,
+    pub infrared: Stream,
     slip: Stream,
 }
 
@@ -142,6 +144,8 @@ impl Robot {
             laser: stream("laser"),
             gyro: stream("gyro"),
             camera: stream("camera"),
+            landmarks: stream("landmarks"),
+            infrared: stream("infrared"),
             slip: stream("slip"),
         };
         let truth = Truth {

@@ -282,12 +282,15 @@ impl Simulator {
         self.robots[id.index()].head
     }
 
-    /// Where a person or thing of this name is (m), and its radius (m); nothing while it is hidden or when there is none.
+    /// Where a person, thing or landmark of this name is (m), and its radius (m); nothing while it is hidden or when there is none.
     ///
     /// A thing that a person carries is found by its own name.
     pub fn locate(&self, name: &str) -> Option<(Point, f64)> {
         if let Some(thing) = self.plan.things.iter().find(|thing| thing.name == name) {
             return Some((thing.at, thing.radius));
+        }
+        if let Some(landmark) = self.plan.landmarks.iter().find(|landmark| landmark.name == name) {
+            return Some((landmark.at, landmark.radius));
         }
         self.people.iter().filter(|walker| walker.present).find_map(|walker| {
             if walker.plan.name == name {

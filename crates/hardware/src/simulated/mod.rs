@@ -17,7 +17,7 @@ use motion::limits::Limits;
 use sim::camera::Canvas;
 use sim::{Goal, Model, RobotId, WorldPlan};
 use types::messages::{
-    Battery, Bumper, Echo, Echoes, Encoding, Gyro, Head, Image, LaserScan, Twist, WheelTicks,
+    Battery, Bumper, Echo, Echoes, Encoding, Gyro, Head, Image, Landmarks, LaserScan, Twist, WheelTicks,
 };
 use types::{Duration, Name, Pose, Time};
 
@@ -25,7 +25,7 @@ pub use truth::{PersonMoment, RobotMoment, Truth};
 use world::World;
 
 use crate::cadence::Cadence;
-use crate::description::{CAMERA, ClockKind, HeadLimits, LASER, Periods, RobotDescription};
+use crate::description::{BASE, CAMERA, ClockKind, HeadLimits, LASER, Periods, RobotDescription};
 use crate::driver::{Driver, DriverError, Listening, Polled, Sink};
 use crate::gate::Permit;
 
@@ -100,6 +100,10 @@ pub fn describe(model: &Model) -> RobotDescription {
         battery: Some(model.battery.period),
         head: Some(model.head.period),
         pose: None,
+        landmarks: [model.landmarks.map(|it| it.period), model.infrared.map(|it| it.period)]
+            .into_iter()
+            .flatten()
+            .min(),
     };
     if let Some(laser) = &model.laser {
         description.mount(LASER, laser.mount(), laser.height);
@@ -148,6 +152,8 @@ struct Cadences {
     gyro: Cadence,
     battery: Cadence,
     head: Cadence,
+    landmarks: Cadence,
+    infrared: Cadence,
 }
 
 /// The driver of a simulated robot.
@@ -183,6 +189,8 @@ impl Simulated {
                 gyro: Cadence::every(periods.gyro),
                 battery: Cadence::every(periods.battery),
                 head: Cadence::every(periods.head),
+                landmarks: Cadence::every(model.landmarks.map(|sensor| sensor.period)),
+                infrared: Cadence::every(model.infrared.map(|sensor| sensor.period)),
             },
             description,
             echoes: empty_ring(model),
@@ -293,6 +301,12 @@ impl Driver for Simulated {
                 *head = form;
                 sim.scan(id, sample, ranges)
             });
+        }
+        if let Some(sample) = due.landmarks.due(time).filter(|_| wanted.landmarks) {
+            sink.landmarks(stamp, &Landmarks { frame: Name::new(BASE), seen: sim.landmarks(id, sample) });
+        }
+        if let Some(sample) = due.infrared.due(time).filter(|_| wanted.landmarks) {
+            sink.landmarks(stamp, &Landmarks { frame: Name::new(BASE), seen: sim.infrared(id, sample) });
         }
         if let Some(sample) = due.image.due(time).filter(|_| wanted.image) {
             let (form, canvas) = (self.image, &mut self.canvas);

@@ -193,7 +193,7 @@ fn gate_keys() -> impl Iterator<Item = &'static str> {
 type Every = fn(&Periods) -> Option<Duration>;
 
 /// The readings of a robot that come by a clock of its own.
-const READINGS: [(&str, Every); 9] = [
+const READINGS: [(&str, Every); 10] = [
     ("sonar", |periods| periods.sonar),
     ("scan", |periods| periods.scan),
     ("image", |periods| periods.image),
@@ -203,6 +203,7 @@ const READINGS: [(&str, Every); 9] = [
     ("battery", |periods| periods.battery),
     ("head", |periods| periods.head),
     ("pose", |periods| periods.pose),
+    ("landmarks", |periods| periods.landmarks),
 ];
 
 impl Ready {
