@@ -6,12 +6,15 @@ use sim::snapshot::Scenery;
 use types::{Point, Pose};
 
 use super::Notes;
+use crate::file::{self, Part};
 use crate::run::Ready;
 
 /// The name of the note with the scenery.
 const SCENERY: &str = "scenery";
 /// The name of the note with the robots.
 const ROBOTS: &str = "robots";
+/// The name of the note with the parts of the run that are drawn by themselves.
+const FIGURES: &str = "figures";
 
 /// What a log has to know of the world and the robots. It depends on the plan and the seed alone.
 pub(crate) fn notes(ready: &Ready) -> Notes {
@@ -32,7 +35,24 @@ pub(crate) fn notes(ready: &Ready) -> Notes {
         row
     });
     notes.insert(ROBOTS.into(), Json::Array(robots.collect()).to_string());
+    let parts = file::figures(&ready.plan);
+    if !parts.is_empty() {
+        let row = |part: &Part| json!([part.name, part.is_way, part.span.0, part.span.1]);
+        notes.insert(FIGURES.into(), parts.iter().map(row).collect::<Json>().to_string());
+    }
     notes
+}
+
+/// The parts of a log's run that are drawn by themselves.
+pub(super) fn parts(notes: &Notes) -> Vec<Part> {
+    let rows = notes.get(FIGURES).and_then(|text| serde_json::from_str::<Vec<Json>>(text).ok());
+    let part = |row: &Json| {
+        let (name, is_way) = (row[0].as_str()?.to_owned(), row[1].as_bool()?);
+        // A log is somebody's file: what is no name of a file is none of ours.
+        let is_plain = name.chars().all(|c| c.is_ascii_alphanumeric() || "-_".contains(c));
+        is_plain.then_some(Part { name, is_way, span: (row[2].as_f64()?, row[3].as_f64()?) })
+    };
+    rows.unwrap_or_default().iter().filter_map(part).collect()
 }
 
 /// The topic of what the robot's wheels are told: the output that is joined to its "drive".

@@ -6,9 +6,10 @@ use record::figure::{Band, Drawing, Event};
 use record::log::{Message, RunInfo};
 use types::cdr::Reader;
 use types::message::Message as Typed;
-use types::messages::{Decision, Echoes, Grant, LaserScan, Odometry, Transforms, Twist};
+use types::messages::{Decision, Echoes, Grant, LaserScan, Odometry, Report, Transforms, Twist};
 use types::{Point, Pose, Time};
 
+use super::TaskOutcome;
 use super::scenery::{self, KnownRobot};
 use crate::run::WORLD;
 
@@ -50,6 +51,8 @@ pub(super) struct Trail {
     pub(super) misses: BTreeMap<String, Vec<f64>>,
     /// From when on each agent was suspended, or was not any more.
     pub(super) rest: BTreeMap<String, Vec<(f64, bool)>>,
+    /// How tasks ended, in the order of their ends.
+    pub(super) tasks: Vec<TaskOutcome>,
     /// The first and the last time.
     pub(super) span: Option<(f64, f64)>,
     known: Vec<KnownRobot>,
@@ -63,7 +66,7 @@ const MOST_POINTS: usize = 60_000;
 /// So many points of the ring of sonars show a room and do not cover it.
 pub(super) const SHOWN_POINTS: usize = 2_500;
 /// Commands nearer to each other than this run into one line (s).
-const COMMANDS: f64 = 0.1;
+const COMMANDS: f64 = 0.04;
 /// A band shorter than this cannot be seen (s).
 const SHORTEST: f64 = 0.3;
 /// A person who moved less than this stands (m).
@@ -77,6 +80,23 @@ fn decode<T: Typed>(message: &Message) -> Option<(T, Vec<T::Element>)> {
     let mut row = Vec::new();
     let head = T::decode(&mut Reader::new(&message.cdr).ok()?, &mut row).ok()?;
     Some((head, row))
+}
+
+impl Seen {
+    /// The same in a part of the run; what was seen of the surroundings stays.
+    pub(super) fn within(&self, (from, until): (f64, f64)) -> Seen {
+        let is_part = |time: f64| (from..=until).contains(&time);
+        let ways = |way: &[(f64, Pose)]| way.iter().filter(|row| is_part(row.0)).copied().collect();
+        let rows = |rows: &[(f64, f64, f64)]| rows.iter().filter(|row| is_part(row.0)).copied().collect();
+        Seen {
+            way: ways(&self.way),
+            log_way: ways(&self.log_way),
+            odometry: ways(&self.odometry),
+            speed: rows(&self.speed),
+            commanded: rows(&self.commanded),
+            ..self.clone()
+        }
+    }
 }
 
 impl Trail {
@@ -160,6 +180,7 @@ impl Trail {
             LaserScan::NAME if self.is_robot(agent) && port == "scan" => self.scan(agent, message),
             Odometry::NAME => self.odometry(time, agent, port, message),
             Twist::NAME => self.command(time, &topic, message),
+            Report::NAME => self.report(time, message),
             Grant::NAME => {
                 if let Some((grant, _)) = decode::<Grant>(message) {
                     let name = grant.agent.as_str().to_owned();
@@ -271,6 +292,15 @@ impl Trail {
         let commanded = &mut self.robot(&name).commanded;
         if commanded.last().is_none_or(|last| time - last.0 >= COMMANDS) {
             commanded.push((time, twist.linear, twist.angular));
+        }
+    }
+
+    /// The first that tells that a task is over counts: the others pass it on.
+    fn report(&mut self, time: f64, message: &Message) {
+        let Some((last, _)) = decode::<Report>(message) else { return };
+        let is_told = self.tasks.iter().any(|known| known.task == last.task);
+        if last.task > 0 && last.progress.is_over() && !is_told {
+            self.tasks.push(TaskOutcome { task: last.task, at: time, last });
         }
     }
 

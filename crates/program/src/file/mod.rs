@@ -12,13 +12,14 @@
 //! | TOML to a tree of values | `tree` |
 //! | built-in scenarios and worlds, and files by name | `library` |
 //! | `--set KEY=VALUE` | `set` |
-//! | the tree to a plan, with all mistakes | `read`, with `agent`, `group`, `wires`, `decide`, `modes`, `knowledge`, `requests`, `spoken` |
+//! | the tree to a plan, with all mistakes | `read`, with `agent`, `group`, `wires`, `decide`, `modes`, `figure`, `knowledge`, `requests`, `spoken` |
 //! | the plan to a text | `write` |
 
 mod agent;
 mod burden;
 mod compare;
 mod decide;
+mod figure;
 mod group;
 pub(crate) mod knowledge;
 mod library;
@@ -36,6 +37,7 @@ mod write;
 pub(crate) use burden::{as_declared, burdens, processors};
 pub(crate) use compare::compared;
 pub(crate) use decide::read_alone;
+pub(crate) use figure::{Part, figures};
 pub use library::{Found, Shelf};
 pub(crate) use read::SECTIONS;
 pub use read::{Loaded, check, load, read, read_plan};

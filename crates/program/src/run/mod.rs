@@ -18,6 +18,7 @@ mod screen;
 mod seeds;
 mod serve;
 mod summary;
+mod tasks;
 mod timing;
 mod useful;
 
@@ -341,6 +342,7 @@ impl One<'_> {
         if log.is_file() {
             summary.files.insert(0, log.clone());
         }
+        summary.tasks = figures::tasks(log).unwrap_or_default();
         let made = figures::of_log(log, &place.folder, Some(figures::timing(&summary.agents)));
         match made {
             Ok(files) => summary.files.extend(files),

@@ -13,7 +13,9 @@ use super::judge;
 use super::knowing;
 use super::prepare::Ready;
 use super::recorder::LogOutcome;
+use super::tasks;
 use super::useful::{Done, useful};
+use crate::figures::TaskOutcome;
 use crate::terminal::paint;
 
 /// What became of a robot.
@@ -78,6 +80,8 @@ pub(crate) struct Summary {
     /// Pictures a second that were to be kept.
     pub(crate) images: f64,
     pub(crate) files: Vec<PathBuf>,
+    /// What became of the tasks of the reactive layer, where there is a log.
+    pub(crate) tasks: Vec<TaskOutcome>,
     pub(crate) repeat: Option<Repeated>,
     /// What the agents did whose plan says how important they are.
     pub(crate) done: Vec<Done>,
@@ -142,6 +146,7 @@ impl Summary {
             log: None,
             images: 0.0,
             files: Vec::new(),
+            tasks: Vec::new(),
             repeat: None,
             done: Vec::new(),
             compared: Compared::default(),
@@ -267,6 +272,7 @@ impl Summary {
                     "nominal": done.work.nominal, "in_time": done.work.in_time, "quality": done.work.quality,
                 })).collect::<Vec<_>>(),
             })),
+            "tasks": tasks::document(&self.tasks),
             "compared": self.compared.document,
             "messages": {"sent": self.sent, "dropped": self.dropped, "refused": self.refused},
             "allocations": self.allocations.as_ref().map(|by| json!({
@@ -359,6 +365,7 @@ impl Summary {
                 }
             });
         }
+        tasks::text(&self.tasks).into_iter().for_each(&mut line);
         self.compared.text.iter().for_each(|text| line(text.clone()));
         for (i, file) in self.files.iter().enumerate() {
             line(format!("  {:<12} {}", if i == 0 { "files" } else { "" }, file.display()));
