@@ -10,8 +10,8 @@
 
 use std::any::Any;
 
-use navigation::field::{Cell, Field, Grid, Path as Found, Refined};
 use navigation::ground::{CELL, Ground};
+use navigation::path::{Anytime, Cell, Field, Grid, Path as Found, Refined};
 use perception::local_map::{LocalMap, MapParams};
 use runtime::{Agent, Fault, Input, Output, Step};
 use types::geometry::{PI, whole};

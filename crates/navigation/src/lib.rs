@@ -6,12 +6,12 @@
 //! | module | from | to |
 //! |---|---|---|
 //! | [`ground`] | where it is free, where something stands, where the robot has been | the way to the nearest new ground |
-//! | [`field`] | a grid, a start and a goal | a first way at once, then better ones up to the shortest |
+//! | [`path`] | a grid, a start and a goal | the shortest way, or one at once and then better ones; smoothed, with a time table |
 //! | [`roam`] | what is around, and the ground | a motion along the walls, through every gap, to where the robot has not been |
 #![forbid(unsafe_code)]
 
-pub mod field;
 pub mod ground;
 mod layer;
+pub mod path;
 pub mod roam;
 mod search;
