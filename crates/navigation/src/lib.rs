@@ -7,10 +7,12 @@
 //! |---|---|---|
 //! | [`ground`] | where it is free, where something stands, where the robot has been | the way to the nearest new ground |
 //! | [`field`] | a grid, a start and a goal | a first way at once, then better ones up to the shortest |
+//! | [`calibration`] | measurements of the robot itself | its wheels, and distances by sizes in the picture |
 //! | [`localisation`] | steps of the wheels, sightings of landmarks and robots, scans on a known map | where the robot is, was and will be |
 //! | [`roam`] | what is around, and the ground | a motion along the walls, through every gap, to where the robot has not been |
 #![forbid(unsafe_code)]
 
+pub mod calibration;
 pub mod field;
 pub mod ground;
 mod layer;
