@@ -9,6 +9,7 @@
 //! | [`field`] | a grid, a start and a goal | a first way at once, then better ones up to the shortest |
 //! | [`calibration`] | measurements of the robot itself | its wheels, and distances by sizes in the picture |
 //! | [`localisation`] | steps of the wheels, sightings of landmarks and robots, scans on a known map | where the robot is, was and will be |
+//! | [`mapping`] | poses and scans | a map of what stands where |
 //! | [`roam`] | what is around, and the ground | a motion along the walls, through every gap, to where the robot has not been |
 #![forbid(unsafe_code)]
 
@@ -17,5 +18,6 @@ pub mod field;
 pub mod ground;
 mod layer;
 pub mod localisation;
+pub mod mapping;
 pub mod roam;
 mod search;
