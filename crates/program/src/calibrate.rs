@@ -42,11 +42,10 @@ struct Answer {
 
 /// Fits, and prints parameters that can be pasted, and what is left over.
 pub(crate) fn calibrate(command: &CalibrateCommand, json: bool) -> Result<ExitCode, Failure> {
-    let (samples, fit): (_, fn(&Read) -> Result<Answer, Failure>) = match command {
-        CalibrateCommand::Odometry(samples) => (samples, odometry::fit),
-        CalibrateCommand::Landmark(samples) => (samples, landmark::fit),
+    let answer = match command {
+        CalibrateCommand::Odometry(samples) => odometry::fit(&Read::open(&samples.file)?)?,
+        CalibrateCommand::Landmark(samples) => landmark::fit(&Read::open(&samples.file)?)?,
     };
-    let answer = fit(&Read::open(&samples.file)?)?;
     if json {
         terminal::say_json(&answer.json)
     } else {
