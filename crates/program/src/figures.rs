@@ -11,7 +11,7 @@ use record::log::Reader;
 use runtime::AgentView;
 use types::Point;
 
-pub(crate) use scenery::notes;
+pub(crate) use scenery::{notes, stands};
 use trail::{Seen, Trail};
 
 /// Dots in an inch of a PNG: what journals ask of line art at this size.

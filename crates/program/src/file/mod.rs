@@ -12,11 +12,12 @@
 //! | TOML to a tree of values | `tree` |
 //! | built-in scenarios and worlds, and files by name | `library` |
 //! | `--set KEY=VALUE` | `set` |
-//! | the tree to a plan, with all mistakes | `read`, with `agent`, `group`, `wires`, `decide`, `knowledge`, `requests` |
+//! | the tree to a plan, with all mistakes | `read`, with `agent`, `group`, `wires`, `decide`, `knowledge`, `requests`, `calls` |
 //! | the plan to a text | `write` |
 
 mod agent;
 mod burden;
+pub(crate) mod calls;
 mod compare;
 mod decide;
 mod group;

@@ -3,11 +3,13 @@
 use runtime::{FaultKind, TimedRequest};
 use types::value::{Mistake, Span, Table, TableReader};
 
+use super::calls;
 use super::read::{Reader, span_of_time};
 
 /// The commands that change a running system.
-const VERBS: [&str; 11] =
-    ["add", "remove", "restart", "replace", "wire", "unwire", "set", "stop", "reset", "quit", "fault"];
+const VERBS: [&str; 12] = [
+    "add", "remove", "restart", "replace", "wire", "unwire", "set", "call", "stop", "reset", "quit", "fault",
+];
 
 impl Reader<'_> {
     pub(super) fn requests(&mut self, tree: &Table) {
@@ -51,6 +53,11 @@ impl Reader<'_> {
         if !VERBS.contains(&verb.as_str()) {
             self.mistakes.push(Mistake::unknown(at, "request", verb, VERBS));
             return;
+        }
+        if verb == "call"
+            && let Err(refusal) = calls::in_bytes(words, &self.plan, self.registry)
+        {
+            self.mistakes.push(Mistake::new(at, refusal.to_string()));
         }
         if verb != "fault" {
             return;

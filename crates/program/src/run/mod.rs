@@ -44,7 +44,7 @@ use knowing::Knowing;
 pub(crate) use asked::Asked;
 pub(crate) use burden::{BurdenArgs, burden};
 pub(crate) use judge::{Facts, Judge, WORLD};
-pub(crate) use prepare::{ROBOT_KIND, Ready, Scenario};
+pub(crate) use prepare::{ROBOT_KIND, Ready, Scenario, WORLD_AGENT, WORLD_KIND};
 pub(crate) use recorder::{LogFile, choice};
 pub(crate) use serve::start as serve;
 pub(crate) use summary::{Summary, failure, span, table};
@@ -174,6 +174,7 @@ impl One<'_> {
             );
         }
         let mut plan = ready.plan.clone();
+        file::calls::ready(&mut plan, &ready.registry);
         let firings = self.knowing.map(|knowing| knowing.firings(self.clock, self.limit(&ready)));
         let asked = Asked::of(&mut plan, firings.unwrap_or_default(), self.repeat.as_ref());
         let log = self.log(&ready, &asked)?;
@@ -363,8 +364,9 @@ fn plan_text(ready: &Ready) -> String {
     file::write_plan(&plan_of_file(ready.plan.clone()))
 }
 
-/// The plan as its file has it: the gates' own types are a matter of the run.
+/// The plan as its file has it: the gates' own types are a matter of the run, and so is the agent that changes its world.
 pub(crate) fn plan_of_file(mut plan: Plan) -> Plan {
+    plan.agents.retain(|agent| agent.kind != WORLD_KIND);
     for agent in plan.agents.iter_mut().filter(|agent| agent.kind.starts_with(ROBOT_KIND)) {
         agent.kind = "robot".to_owned();
     }

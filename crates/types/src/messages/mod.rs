@@ -13,6 +13,7 @@ mod pose;
 mod ranges;
 mod reasons;
 mod sighting;
+mod world;
 
 pub use body::{Battery, Bumper, Gyro, Head, WheelTicks};
 pub use command::{Amount, Direction, Drive, Offer, Twist, Verb, Word};
@@ -27,3 +28,4 @@ pub use pose::{FrameTransform, Odometry, Transforms};
 pub use ranges::{DIRECTIONS, Echo, Echoes, LaserScan, Ranges, Risk};
 pub use reasons::{Held, MOST_REASONS, MOST_SITUATIONS, Reason, Reasons, Signal};
 pub use sighting::Sighting;
+pub use world::{WorldAnswer, WorldName, WorldPlace, WorldPush, WorldSlip, WorldThing};
