@@ -15,7 +15,7 @@ use types::Point;
 use types::messages::Report;
 
 use crate::file::Part;
-pub(crate) use scenery::notes;
+pub(crate) use scenery::{notes, stands};
 use trail::{Seen, Trail};
 
 /// Dots in an inch of a PNG: what journals ask of line art at this size.

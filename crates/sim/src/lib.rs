@@ -4,7 +4,8 @@
 //! |---|---|
 //! | what a world file says | [`plan`] |
 //! | what a robot is made of | [`model`] |
-//! | the running world | [`simulator`], with `robot` (motion, contacts) and `people` (scripts) |
+//! | the running world | [`simulator`], with `robot` (motion, contacts), `people` (scripts) and `crowd` |
+//! | what a hand does to it meanwhile | [`hand`] |
 //! | sensors | `sonar`, [`laser`], [`camera`], [`landmarks`]; all are methods of [`Simulator`] |
 //! | what makes a run a success | [`goal`] |
 //! | what a seed changes | [`vary`], with [`free_way`] |
@@ -16,9 +17,11 @@
 
 pub mod camera;
 pub mod colour;
+mod crowd;
 mod field;
 pub mod free_way;
 pub mod goal;
+pub mod hand;
 pub mod landmarks;
 pub mod laser;
 pub mod model;

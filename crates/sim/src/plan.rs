@@ -31,6 +31,8 @@ pub struct WorldPlan {
     pub rounds: Vec<Round>,
     /// People.
     pub people: Vec<Person>,
+    /// Crowds of people who walk about.
+    pub crowds: Vec<Crowd>,
     /// Coloured things that stand by themselves.
     pub things: Vec<Thing>,
     /// What sensors can tell from everything else.
@@ -177,6 +179,32 @@ pub struct Person {
     pub repeat: bool,
     /// Whether scattering may move the person.
     pub movable: bool,
+    /// Walks about for ever, instead of a script.
+    pub roams: Option<Roam>,
+}
+
+/// How a person walks about: from one place of an area to another, as chance has it, around what stands in the way.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Roam {
+    /// The region in which the places lie.
+    pub area: String,
+    /// Whether the person stops or steps aside before a robot. One who does not walks on until the two touch, and then around.
+    pub yields: bool,
+}
+
+/// People who walk about an area. Who they are, where they begin and where they go comes from the seed.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Crowd {
+    /// How many they are; fewer where there is no room for all.
+    pub count: u32,
+    /// The region in which they walk.
+    pub area: String,
+    /// The share of those who give way to a robot, 0 to 1.
+    pub yields: f64,
+    /// The slowest and the fastest (m/s).
+    pub speed: (f64, f64),
+    /// Radius of each (m).
+    pub radius: f64,
 }
 
 /// One leg of a person's walk.
@@ -214,6 +242,7 @@ impl Default for WorldPlan {
             boxes: Vec::new(),
             rounds: Vec::new(),
             people: Vec::new(),
+            crowds: Vec::new(),
             things: Vec::new(),
             landmarks: Vec::new(),
             regions: Vec::new(),
@@ -306,7 +335,15 @@ impl Default for Person {
             walk: Vec::new(),
             repeat: false,
             movable: false,
+            roams: None,
         }
+    }
+}
+
+impl Default for Crowd {
+    /// Twelve people between a stroll and a fast walk, of whom every other one gives way.
+    fn default() -> Crowd {
+        Crowd { count: 12, area: String::new(), yields: 0.5, speed: (0.5, 1.5), radius: 0.25 }
     }
 }
 

@@ -7,7 +7,7 @@ use types::value::{Entry, Mistake, Span, Table, TableReader, Value};
 use types::{Duration, Point};
 
 use crate::colour::{Colour, NAMES};
-use crate::plan::{Cuboid, Door, Landmark, Leg, Person, Region, Round, Thing, Wall, WorldPlan};
+use crate::plan::{Crowd, Cuboid, Door, Landmark, Leg, Person, Region, Round, Thing, Wall, WorldPlan};
 use crate::shape;
 
 /// Coordinates beyond this are mistakes (m).
@@ -49,6 +49,7 @@ impl WorldPlan {
         plan.landmarks = r.each("landmark", |r| read_landmark(r, &mut next));
         let regions: Vec<&str> = plan.regions.iter().map(|region| region.name.as_str()).collect();
         plan.people = r.each("person", |r| read_person(r, &regions));
+        plan.crowds = r.each("people", |r| read_crowd(r, &regions));
         r.finish();
         check_names(table, "regions", &["region"], mistakes);
         check_names(table, "people or things", &["person", "thing", "landmark"], mistakes);
@@ -373,6 +374,33 @@ fn read_person(r: &mut Reader<'_, '_>, regions: &[&str]) -> Person {
     }
     person.walk = r.each("walk", |r| read_leg(r, regions));
     person
+}
+
+fn read_crowd(r: &mut Reader<'_, '_>, regions: &[&str]) -> Crowd {
+    let mut crowd = Crowd::default();
+    match r.inner.int("count") {
+        None => {}
+        Some(count) if (1..=200).contains(&count) => crowd.count = count as u32,
+        Some(count) => {
+            let at = r.inner.place("count");
+            r.inner.report(Mistake::new(at, format!("\"count\" is {count}, it must lie from 1 to 200")));
+        }
+    }
+    match read_when(r, "area", regions) {
+        Some(area) => crowd.area = area,
+        None => r.inner.missing("area", "the region in which they walk"),
+    }
+    r.number("yields", 0.0, 1.0, &mut crowd.yields);
+    r.number("radius", 0.05, 0.5, &mut crowd.radius);
+    if let Some([slow, fast]) = r.inner.floats::<2>("speed") {
+        if 0.01 <= slow && slow <= fast && fast <= 5.0 {
+            crowd.speed = (slow, fast);
+        } else {
+            let at = r.inner.place("speed");
+            r.inner.report(Mistake::new(at, "\"speed\" is the slowest and the fastest, from 0.01 to 5 m/s"));
+        }
+    }
+    crowd
 }
 
 fn read_leg(r: &mut Reader<'_, '_>, regions: &[&str]) -> Leg {

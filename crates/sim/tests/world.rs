@@ -11,6 +11,8 @@ use types::{Duration, Point, Pose, Time};
 
 mod body;
 mod common;
+mod crowd;
+mod hand;
 mod home;
 mod landmarks;
 

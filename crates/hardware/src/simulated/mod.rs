@@ -7,6 +7,7 @@
 //!
 //! What the judge knows leaves through [`Truth`] alone; no output of a robot carries it.
 
+mod hands;
 mod truth;
 mod world;
 
@@ -21,6 +22,7 @@ use types::messages::{
 };
 use types::{Duration, Name, Pose, Time};
 
+pub use hands::{Hands, SERVICES, World as WorldAgent, services};
 pub use truth::{PersonMoment, RobotMoment, Truth};
 use world::World;
 
@@ -205,6 +207,13 @@ impl Simulated {
             },
             pressed: 0,
         }
+    }
+}
+
+impl Simulated {
+    /// A way to change the world of this robot while it runs.
+    pub fn hands(&self) -> Hands {
+        Hands(self.world.clone())
     }
 }
 

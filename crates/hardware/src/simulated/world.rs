@@ -62,6 +62,13 @@ impl World {
         &self.simulator
     }
 
+    /// Has the world changed from outside, and tells of it at once.
+    pub(super) fn change<T>(&mut self, deed: impl FnOnce(&mut Simulator) -> T) -> T {
+        let done = deed(&mut self.simulator);
+        self.publish();
+        done
+    }
+
     /// Steps the world to the caller's time, never beyond it. Gives the caller's time of the state that it is in then.
     pub(super) fn advance(&mut self, now: Time) -> Time {
         let origin = *self.origin.get_or_insert(now);

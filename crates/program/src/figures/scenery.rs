@@ -2,6 +2,7 @@
 
 use record::figure::{Drawing, Region};
 use serde_json::{Value as Json, json};
+use sim::hand::Standing;
 use sim::snapshot::Scenery;
 use types::{Point, Pose};
 
@@ -83,6 +84,33 @@ fn scenery(scenery: &Scenery) -> Json {
         "discs": discs.collect::<Vec<_>>(),
         "regions": regions.collect::<Vec<_>>(),
     })
+}
+
+/// What a note of a thing begins with that was added while the run went.
+const STANDS: &str = "stands: ";
+
+/// The note of a thing that was added to the world.
+pub(crate) fn stands(thing: &Standing) -> String {
+    let outline = match thing.shape.corners(thing.pose) {
+        Some(corners) => json!({"corners": corners.iter().map(|p| point(*p)).collect::<Vec<_>>()}),
+        None => json!({"disc": [point(thing.pose.position()), thing.shape.reach()]}),
+    };
+    format!("{STANDS}{} {outline}", thing.name)
+}
+
+/// Draws the thing that a note tells of, if it tells of one.
+pub(super) fn draw_standing(drawing: &mut Drawing, note: &str) {
+    let Some(at) = note.strip_prefix(STANDS).and_then(|rest| rest.find('{').map(|at| &rest[at..])) else {
+        return;
+    };
+    let Ok(json) = serde_json::from_str::<Json>(at) else { return };
+    let corners: Vec<Point> =
+        json["corners"].as_array().into_iter().flatten().filter_map(read_point).collect();
+    for (k, corner) in corners.iter().enumerate() {
+        drawing.segments.push((*corner, corners[(k + 1) % corners.len()]));
+    }
+    let disc = &json["disc"];
+    drawing.circles.extend(read_point(&disc[0]).zip(disc[1].as_f64()));
 }
 
 fn read_point(json: &Json) -> Option<Point> {

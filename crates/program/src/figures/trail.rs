@@ -309,6 +309,9 @@ impl Trail {
         let Some(table) = value.as_table() else { return };
         let text = |key: &str| table.get(key).and_then(|entry| entry.value.as_text()).unwrap_or_default();
         let (who, what) = (text("name"), text("msg"));
+        if who == WORLD {
+            return scenery::draw_standing(&mut self.drawing, what);
+        }
         if what.starts_with("missed its deadline") {
             self.misses.entry(who.to_owned()).or_default().push(time);
         }

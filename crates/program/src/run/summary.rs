@@ -208,6 +208,11 @@ impl Summary {
         self.truths().map(|truth| truth.collisions).reduce(|a, b| a + b)
     }
 
+    /// How often others ran into any robot; nothing where nobody knows.
+    pub(crate) fn bumped(&self) -> Option<u32> {
+        self.truths().map(|truth| truth.bumped).reduce(|a, b| a + b)
+    }
+
     /// The smallest distance of any robot to anything (m).
     pub(crate) fn closest(&self) -> Option<f64> {
         self.truths().map(|truth| truth.closest).reduce(f64::min)
@@ -258,6 +263,7 @@ impl Summary {
             "ended": self.ended,
             "goal": {"met": self.met, "why": self.why, "stages_s": self.stages()},
             "collisions": self.collisions(),
+            "bumped": self.bumped(),
             "closest_m": self.closest(),
             "distance_m": self.distance(),
             "deadlines": {
@@ -571,7 +577,12 @@ fn robot_lines(robot: &RobotOutcome, several: bool, begun: Time) -> Vec<String> 
         } else {
             format!("closest {:.2} m", truth.closest)
         };
-        lines.push(format!("  safety       {who}{collisions}, {closest}"));
+        let bumped = match truth.bumped {
+            0 => String::new(),
+            1 => ", others ran into it once".to_owned(),
+            n => format!(", others ran into it {n} times"),
+        };
+        lines.push(format!("  safety       {who}{collisions}{bumped}, {closest}"));
         lines.push(format!("  way          {who}{:.1} m", truth.distance));
     }
     if robot.shadow {
@@ -646,6 +657,7 @@ fn robot_json(robot: &RobotOutcome, begun: Time) -> Json {
     json!({
         "name": robot.name,
         "collisions": robot.truth.map(|truth| truth.collisions),
+        "bumped": robot.truth.map(|truth| truth.bumped),
         "closest_m": robot.truth.map(|truth| truth.closest),
         "distance_m": robot.truth.map(|truth| truth.distance),
         "commands": robot.commands,

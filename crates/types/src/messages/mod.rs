@@ -16,6 +16,7 @@ mod reasons;
 mod sighting;
 mod stop;
 mod task;
+mod world;
 
 pub use body::{Battery, Bumper, Gyro, Head, WheelTicks};
 pub use command::{Amount, Direction, Drive, Offer, Twist, Verb, Word};
@@ -33,3 +34,4 @@ pub use reasons::{Held, MOST_REASONS, MOST_SITUATIONS, Reason, Reasons, Signal};
 pub use sighting::Sighting;
 pub use stop::{EmergencyStop, StopKind};
 pub use task::{Answer, Goal, Halt, Manoeuvre, Motion, Progress, Report, Task};
+pub use world::{WorldAnswer, WorldName, WorldPlace, WorldPush, WorldSlip, WorldThing};
