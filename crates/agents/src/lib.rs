@@ -20,6 +20,7 @@
 //! | [`path_follower`] | a task, a path, odometry | a wish to drive along the path |
 //! | [`emergency_stop`] | scan, ranges, how the robot moves | a bound that ramps it down before what it would meet |
 //! | [`navigation`] | goals and manoeuvres of people and programs | tasks, and what becomes of them |
+//! | [`tour`] | places | the wish to go there, one after another |
 //! | [`process_supervisor`] | tasks, who lives | the mode: who is heard, and how |
 //! | [`real_time_supervisor`] | modes, tasks, reports of actions | the same for the real-time side, together; standing when one is silent |
 //! | [`coordinator`] | wishes, safety, decision, mode | one command for the drive |
@@ -54,6 +55,7 @@ pub mod resource_manager;
 pub mod safety_monitor;
 mod shared;
 pub mod sonar;
+pub mod tour;
 mod trust;
 pub mod wall_follower;
 
@@ -78,6 +80,7 @@ pub use recogniser::Recogniser;
 pub use resource_manager::ResourceManager;
 pub use safety_monitor::SafetyMonitor;
 pub use sonar::Sonar;
+pub use tour::Tour;
 pub use wall_follower::WallFollower;
 
 /// All agents of this crate, by their kinds.
@@ -98,6 +101,7 @@ pub fn registry() -> runtime::Registry {
         PathFollower,
         EmergencyStopAction,
         Navigation,
+        Tour,
         ProcessSupervisor,
         RealTimeSupervisor,
         PanTilt,
@@ -132,6 +136,7 @@ mod tests {
             "path-follower",
             "emergency-stop",
             "navigation",
+            "tour",
             "process-supervisor",
             "real-time-supervisor",
             "head",

@@ -98,6 +98,8 @@ pub(crate) struct TaskOutcome {
     /// When it was over (s).
     pub(crate) at: f64,
     pub(crate) last: Report,
+    /// How far the robot truly was from the place then, where the truth is known and the place is one of the map (m).
+    pub(crate) off: Option<f64>,
 }
 
 /// How the tasks of a log ended.

@@ -6,7 +6,9 @@ use record::figure::{Band, Drawing, Event};
 use record::log::{Message, RunInfo};
 use types::cdr::Reader;
 use types::message::Message as Typed;
-use types::messages::{Decision, Echoes, Grant, LaserScan, Odometry, Report, Transforms, Twist};
+use types::messages::{
+    Decision, Echoes, Grant, LaserScan, Motion, Odometry, Report, Task, Transforms, Twist,
+};
 use types::{Point, Pose, Time};
 
 use super::TaskOutcome;
@@ -55,6 +57,8 @@ pub(super) struct Trail {
     pub(super) tasks: Vec<TaskOutcome>,
     /// The first and the last time.
     pub(super) span: Option<(f64, f64)>,
+    /// The tasks, by their numbers.
+    asked: BTreeMap<u32, Task>,
     known: Vec<KnownRobot>,
     begun: Option<Time>,
     /// Where the laser sits on the robot.
@@ -181,6 +185,7 @@ impl Trail {
             Odometry::NAME => self.odometry(time, agent, port, message),
             Twist::NAME => self.command(time, &topic, message),
             Report::NAME => self.report(time, message),
+            Task::NAME => self.task(message),
             Grant::NAME => {
                 if let Some((grant, _)) = decode::<Grant>(message) {
                     let name = grant.agent.as_str().to_owned();
@@ -300,8 +305,25 @@ impl Trail {
         let Some((last, _)) = decode::<Report>(message) else { return };
         let is_told = self.tasks.iter().any(|known| known.task == last.task);
         if last.task > 0 && last.progress.is_over() && !is_told {
-            self.tasks.push(TaskOutcome { task: last.task, at: time, last });
+            let off = self.off(last.task);
+            self.tasks.push(TaskOutcome { task: last.task, at: time, last, off });
         }
+    }
+
+    fn task(&mut self, message: &Message) {
+        if let Some((task, _)) = decode::<Task>(message) {
+            self.asked.insert(task.number, task);
+        }
+    }
+
+    /// How far the only robot truly is from the place of a task, where that is one of the map (m).
+    fn off(&self, task: u32) -> Option<f64> {
+        let task = self.asked.get(&task)?;
+        let has_place = matches!(task.motion, Motion::Goto | Motion::Path | Motion::Dock);
+        let mut robots = self.robots.values().filter_map(|seen| seen.way.last());
+        let (Some((_, pose)), None) = (robots.next(), robots.next()) else { return None };
+        let is_true = has_place && task.frame.as_str() == "map";
+        is_true.then(|| pose.position().distance(task.target.position()))
     }
 
     fn note(&mut self, time: f64, message: &Message) {
