@@ -46,15 +46,16 @@ pub struct Camera {
     #[robot("image")]
     image: Input<Image>,
     /// The pictures as they are. It costs a copy: who needs nothing else listens to the robot's own port.
-    #[port(rows = BYTES_MAX)]
+    #[port(rows = BYTES_MAX, raw)]
     rgb: Output<Image>,
     /// Hue, saturation and intensity.
-    #[port(rows = BYTES_MAX)]
+    #[port(rows = BYTES_MAX, filtered)]
     hsi: Output<Image>,
     /// How strong the change of intensity is at each pixel.
-    #[port(rows = BYTES_MAX / 3)]
+    #[port(rows = BYTES_MAX / 3, filtered)]
     edges: Output<Image>,
     /// What has changed since the picture before.
+    #[port(interpreted)]
     motion: Output<PictureMotion>,
     params: CameraParams,
     /// Made when the agent starts: its tables take some milliseconds, which nobody shall spend who only asks for the ports.

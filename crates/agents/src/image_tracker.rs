@@ -99,7 +99,7 @@ pub struct ImageTracker {
     /// Where the head looks; without it the camera looks ahead.
     head: Input<Head>,
     /// Where the target is and how much it is to be followed.
-    #[port(history = 64)]
+    #[port(history = 64, interpreted)]
     target: Output<Target>,
     /// A wish to drive to it.
     drive: Output<Offer>,

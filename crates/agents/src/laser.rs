@@ -57,9 +57,10 @@ pub struct Laser {
     #[robot("scan")]
     scan: Input<LaserScan>,
     /// Distances from the robot's centre to what is nearest in each direction.
-    #[port(history = 16)]
+    #[port(history = 16, filtered)]
     ranges: Output<Ranges>,
     /// How likely something in a direction will be run into, from the change between two scans.
+    #[port(interpreted)]
     risk: Output<Risk>,
     params: LaserParams,
     reduction: Reduction,

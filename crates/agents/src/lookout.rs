@@ -68,7 +68,7 @@ pub struct Lookout {
     /// Who is seen, by any number of recognisers.
     sightings: Input<Sighting>,
     /// The nearer of both in each direction.
-    #[port(history = 16)]
+    #[port(history = 16, interpreted)]
     ranges: Output<Ranges>,
     params: LookoutParams,
     crowd: Crowd,

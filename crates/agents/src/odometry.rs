@@ -39,7 +39,7 @@ pub struct DeadReckoning {
     #[robot("gyro")]
     gyro: Input<Gyro>,
     /// The pose in the frame "odom", and the velocity.
-    #[port(history = 64)]
+    #[port(history = 64, interpreted)]
     odometry: Output<Odometry>,
     params: OdometryParams,
     reckoning: Reckoning,

@@ -119,7 +119,7 @@ pub struct Recogniser {
     /// Where the head looks; without it the camera looks ahead.
     head: Input<Head>,
     /// Whether it is in the picture, and where.
-    #[port(history = 64)]
+    #[port(history = 64, interpreted)]
     sighting: Output<Sighting>,
     params: RecogniserParams,
     eye: Eye,

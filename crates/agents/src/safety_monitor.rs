@@ -105,7 +105,7 @@ pub struct SafetyMonitor {
     /// How the robot moves.
     odometry: Input<Odometry>,
     /// The verdict: danger, the speed that is allowed, the wider side.
-    #[port(history = 64)]
+    #[port(history = 64, interpreted)]
     safety: Output<Safety>,
     /// A wish to turn away from what is near.
     drive: Output<Offer>,

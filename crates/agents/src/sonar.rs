@@ -71,12 +71,13 @@ pub struct Sonar {
     #[robot("sonar")]
     echoes: Input<Echoes>,
     /// Distances from the robot's centre, as they were measured.
-    #[port(history = 16)]
+    #[port(history = 16, raw)]
     raw: Output<Ranges>,
     /// The same without echoes that cannot be true.
-    #[port(history = 16)]
+    #[port(history = 16, filtered)]
     filtered: Output<Ranges>,
     /// How likely something in a direction will be run into, from the change between two samples.
+    #[port(interpreted)]
     risk: Output<Risk>,
     params: SonarParams,
     chain: Chain,

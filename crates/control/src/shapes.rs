@@ -3,7 +3,7 @@
 //! | shape | keys |
 //! |---|---|
 //! | `ls` | `system`, `time_s`, `agents`: rows of `name`, `kind`, `state` (`running`, `restarting`, `dead`), `executor`, `asked`, `granted`, `period_s` (null without one), `deadline_s`, the counts, `last_death` (null when it never died), `params`; `queues` |
-//! | `graph` | `system`, `time_s`, `agents`: rows of `name`, `kind`, `doc`, `executor`, `ports`: rows of `name`, `doc`, `direction` (`input`, `output`, `service`, `client`, `router`, `manager`), `message`, `sent`, where it is `router` `asked`, `not_asked`; `wires`: rows of `from`, `to`, `message`, `depth`, `overload`, `filter`, `sent`, `taken`, `dropped`, `refused`, `expired`; `queues` |
+//! | `graph` | `system`, `time_s`, `agents`: rows of `name`, `kind`, `doc`, `executor`, `ports`: rows of `name`, `doc`, `direction` (`input`, `output`, `service`, `client`, `router`, `manager`), `message`, `sent`, of a reading `processing` (`raw`, `filtered`, `interpreted`), where it is `router` `asked`, `not_asked`; `wires`: rows of `from`, `to`, `message`, `depth`, `overload`, `filter`, `sent`, `taken`, `dropped`, `refused`, `expired`; `queues` |
 //! | `top` | `system`, `time_s`, `messages`: `sent`, `taken`, `dropped`, `refused`, `expired` over all wires; `agents`: rows of `name`, `state`, `executor`, `asked`, `granted`, the counts, and the figures `exec`, `jitter`, `response` |
 //! | counts | `releases`, `missed`, `stalled`, `skipped`, `faults`, `panics`, `hangs`, `restarts`, `refinements`, `overruns` (of the budget for refinements); how it does its step at the moment: `method` and `budget_s` (null without), `suspended`; of execution times `left_out` (a stall was in the step), `checked` (held against the clock of the thread) and `disagreed`; `allocations` (how often steps took or freed memory, where the program watches that) |
 //! | figure | `name`, `unit`, `n`, `min`, `p50`, `p99`, `p999`, `max`: unfiltered; all values null while `n` is 0 |
@@ -149,6 +149,9 @@ fn graph_port(port: &PortView) -> Json {
     let mut row = json!({
         "name": port.name, "doc": port.doc, "direction": direction, "message": port.message, "sent": port.sent,
     });
+    if let Some(processing) = port.processing {
+        row["processing"] = processing.name().into();
+    }
     if let Some((asked, not_asked)) = port.asked {
         (row["asked"], row["not_asked"]) = (asked.into(), not_asked.into());
     }

@@ -100,26 +100,34 @@ impl Berth {
 pub struct Robot {
     params: RobotParams,
     /// Firings of the sonar ring.
+    #[port(raw)]
     sonar: Output<Echoes>,
     /// Scans of the laser.
-    #[port(rows = 4096)]
+    #[port(rows = 4096, raw)]
     scan: Output<LaserScan>,
     /// Pictures of the camera. There is room for those that the robot's own camera takes.
-    #[port(rows = self.berth.picture)]
+    #[port(rows = self.berth.picture, raw)]
     image: Output<Image>,
     /// Counts of the wheels.
+    #[port(raw)]
     ticks: Output<WheelTicks>,
     /// What touches the robot.
+    #[port(raw)]
     bumper: Output<Bumper>,
     /// The turn rate.
+    #[port(raw)]
     gyro: Output<Gyro>,
     /// The battery.
+    #[port(raw)]
     battery: Output<Battery>,
     /// Where the head looks.
+    #[port(raw)]
     head: Output<Head>,
     /// The poses that came with a recording, in the frame "log"; other robots have none.
+    #[port(interpreted)]
     pose: Output<Odometry>,
     /// What is seen or heard of landmarks.
+    #[port(raw)]
     landmarks: Output<Landmarks>,
     /// Where the sensors sit.
     #[port(rows = 64)]

@@ -13,6 +13,14 @@ const ROUTER: &str = "Router";
 /// The end at the resource side of the runtime, likewise.
 const MANAGER: &str = "Manager";
 
+/// How far what an output gives is from the hardware.
+const PROCESSING: [&str; 3] = ["raw", "filtered", "interpreted"];
+
+fn capitalised(word: &str) -> String {
+    let mut letters = word.chars();
+    letters.next().map_or(String::new(), |first| first.to_uppercase().chain(letters).collect())
+}
+
 /// `Input` and `[T]` of `Input<T>`; nothing for other types.
 fn port_type(ty: &Type) -> Option<(String, Vec<&Type>)> {
     let Type::Path(path) = ty else { return None };
@@ -43,6 +51,11 @@ fn options(field: &Field, runtime: &proc_macro2::TokenStream) -> syn::Result<pro
                     sets.push(quote!(single: true));
                     return Ok(());
                 }
+                if let Some(processing) = PROCESSING.iter().find(|known| meta.path.is_ident(known)) {
+                    let variant = format_ident!("{}", capitalised(processing));
+                    sets.push(quote!(processing: ::core::option::Option::Some(#runtime::Processing::#variant)));
+                    return Ok(());
+                }
                 for known in ["history", "rows", "priorities"] {
                     if meta.path.is_ident(known) {
                         let id = format_ident!("{known}");
@@ -51,7 +64,7 @@ fn options(field: &Field, runtime: &proc_macro2::TokenStream) -> syn::Result<pro
                         return Ok(());
                     }
                 }
-                Err(meta.error("a port has `history`, `rows`, `priorities` or `single`"))
+                Err(meta.error("a port has `history`, `rows`, `priorities`, `single`, `raw`, `filtered` or `interpreted`"))
             })?;
         }
     }

@@ -17,7 +17,8 @@ use proc_macro::TokenStream;
 /// * `#[robot("drive")]` on a port wires it to that port of the robot which the system file names for the agent.
 /// * `#[port(history = 16)]` on an output keeps its last messages in memory; `#[port(rows = 4096)]` is the greatest length of
 ///   the row of a large message; `#[port(priorities = "urgent, normal")]` names the priorities that it uses;
-///   `#[port(single)]` on an input lets one sender at most be wired to it.
+///   `#[port(single)]` on an input lets one sender at most be wired to it; `#[port(raw)]`, `#[port(filtered)]` or `#[port(interpreted)]`
+///   on an output says how far what it gives is from the hardware.
 /// * `#[agent(kind = "wall-follower")]` names the type in system files; by default it is the name of the struct in that form.
 /// * `#[agent(methods(exact = 1.0, rough = 0.6))]` names the ways in which it can do its step, the best first, with their quality;
 ///   `#[agent(anytime)]` says that its step refines its result while it may.

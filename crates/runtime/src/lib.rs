@@ -127,8 +127,8 @@ pub use plan::{
 };
 pub use port::{
     Decision, Direction, Envelope, Gives, Input, Look, Manager, NotAsked, Output, OutputFault, OwnAddress,
-    OwnPort, Place, Port, PortEnds, PortOptions, PortShape, PortVisit, REQUESTS_UNDER_WAY, Received, Router,
-    Sent, Takes, Why, WireCounts, WireId, Wiring,
+    OwnPort, Place, Port, PortEnds, PortOptions, PortShape, PortVisit, Processing, REQUESTS_UNDER_WAY,
+    Received, Router, Sent, Takes, Why, WireCounts, WireId, Wiring,
 };
 pub use queue_plan::{MOST_SERVING, PlanParts, Queue, QueuePlan};
 pub use request::{

@@ -64,12 +64,43 @@ pub struct PortOptions {
     /// Whether one sender of ordinary messages at most may be wired to it: whoever commands an actuator commands it alone. Those that can
     /// say something more urgent stand above it.
     pub single: bool,
+    /// How far what it gives is from the hardware; nothing where it gives no reading of a sensor.
+    pub processing: Option<Processing>,
+}
+
+/// How far a reading is from the hardware: what a resource gives is raw, filtered or interpreted. Each can be pushed, by a wire that makes
+/// its receiver run, and pulled, by looking into the memory of an output that keeps one.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Processing {
+    /// As the sensor says it.
+    Raw,
+    /// Without what cannot be true, and in a form that is the same for all sensors of a kind.
+    Filtered,
+    /// What it means: a pose, a risk, a thing that was found.
+    Interpreted,
+}
+
+impl Processing {
+    /// In a word.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Processing::Raw => "raw",
+            Processing::Filtered => "filtered",
+            Processing::Interpreted => "interpreted",
+        }
+    }
 }
 
 impl PortOptions {
     /// By value, with normal priority, for no robot, with any number of senders.
-    pub const DEFAULT: PortOptions =
-        PortOptions { history: 0, rows: 0, priorities: "normal", robot: None, single: false };
+    pub const DEFAULT: PortOptions = PortOptions {
+        history: 0,
+        rows: 0,
+        priorities: "normal",
+        robot: None,
+        single: false,
+        processing: None,
+    };
 
     /// Whether nothing that goes out here is more urgent than usual.
     pub(crate) fn is_ordinary(&self) -> bool {

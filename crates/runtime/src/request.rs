@@ -8,7 +8,7 @@ use types::{AgentId, Duration, Time};
 
 use crate::executor::StepFault;
 use crate::plan::{AgentPlan, WireFilter, WirePlan};
-use crate::port::{Direction, OutputFault, WireCounts};
+use crate::port::{Direction, OutputFault, Processing, WireCounts};
 use crate::queue_plan::QueuePlan;
 use crate::ring::Overload;
 use crate::stats::Figure;
@@ -354,6 +354,8 @@ pub struct PortView {
     pub direction: Direction,
     /// What goes through it.
     pub message: &'static str,
+    /// How far what it gives is from the hardware, where it gives a reading.
+    pub processing: Option<Processing>,
     /// Messages sent out of it.
     pub sent: u64,
     /// Where it leads to the router: requests that were asked, and those that were not because too many were under way.

@@ -94,10 +94,13 @@ pub(super) fn graph(answer: &Json) -> String {
         let _ = writeln!(out, "{name} ({}, {})", text(&agent["kind"]), text(&agent["executor"]));
         let own = |wire: &&Json| wire["from"].as_str().is_some_and(|from| runtime::owner(from) == name);
         for wire in rows(answer, "wires").filter(own) {
+            let from = text(&wire["from"]);
+            let port = rows(agent, "ports").find(|port| from.ends_with(&format!(".{}", text(&port["name"]))));
+            let processing = port.and_then(|port| port["processing"].as_str()).map(|word| format!("{word} "));
             let mut line = format!(
-                "  {} → {}  {}, {} sent",
-                text(&wire["from"]),
+                "  {from} → {}  {}{}, {} sent",
                 text(&wire["to"]),
+                processing.unwrap_or_default(),
                 text(&wire["message"]),
                 text(&wire["sent"])
             );

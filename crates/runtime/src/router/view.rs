@@ -49,6 +49,7 @@ impl Router {
                 doc: port.doc,
                 direction: port.shape.direction,
                 message: port.shape.input.or(port.shape.output).map_or("", |message| message.short_name()),
+                processing: port.options.processing,
                 sent: end.output.as_ref().map_or(0, |output| output.sent()),
                 asked: self.asked_through((known.id, place)),
             });
