@@ -239,6 +239,14 @@ fn done(command: Command, registry: Registry, json: bool) -> Result<ExitCode, Fa
     }
 }
 
+/// Does what is typed behind the name of the program.
+#[cfg(test)]
+pub(crate) fn typed(words: &[&str]) -> Result<ExitCode, Failure> {
+    let line = Line::try_parse_from(["sinew"].iter().chain(words));
+    let line = line.map_err(|error| Failure::new(error.to_string()))?;
+    done(line.command, agents::registry(), line.json)
+}
+
 /// Help and versions are answers; everything else is wrong usage.
 fn not_understood(error: &clap::Error, json: bool) -> ExitCode {
     if matches!(error.kind(), ErrorKind::DisplayHelp | ErrorKind::DisplayVersion) {

@@ -184,6 +184,12 @@ fn agent(kind: &AgentType) -> Json {
         ("on", on),
         ("min_gap", time("The least time between two steps that messages make it run.")),
         (
+            "wake_gap",
+            time(
+                "The least time between two steps that it asks for itself; the analysis counts them where it is said.",
+            ),
+        ),
+        (
             "executor",
             open_choice(executors, "The thread it runs on; chosen by the deadline when nothing is said."),
         ),

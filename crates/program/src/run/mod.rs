@@ -6,6 +6,8 @@
 //!                                     Judge ─────┘         log ◀┘  └▶ screen, control
 //! ```
 
+#[cfg(test)]
+mod admitted;
 mod asked;
 mod burden;
 mod compare;
