@@ -7,10 +7,12 @@
 //! |---|---|---|
 //! | [`ground`] | where it is free, where something stands, where the robot has been | the way to the nearest new ground |
 //! | [`field`] | a grid, a start and a goal | a first way at once, then better ones up to the shortest |
+//! | [`floor`] | a plan of walls, or a grid | how far any point is from them, exactly |
 //! | [`roam`] | what is around, and the ground | a motion along the walls, through every gap, to where the robot has not been |
 #![forbid(unsafe_code)]
 
 pub mod field;
+pub mod floor;
 pub mod ground;
 mod layer;
 pub mod roam;
