@@ -8,6 +8,7 @@
 //! | [`ground`] | where it is free, where something stands, where the robot has been | the way to the nearest new ground |
 //! | [`field`] | a grid, a start and a goal | a first way at once, then better ones up to the shortest |
 //! | [`floor`] | a plan of walls, or a grid | how far any point is from them, exactly |
+//! | [`matching`] | a scan, a floor, and about where | where the scan was taken, and how sure that is |
 //! | [`roam`] | what is around, and the ground | a motion along the walls, through every gap, to where the robot has not been |
 #![forbid(unsafe_code)]
 
@@ -15,5 +16,7 @@ pub mod field;
 pub mod floor;
 pub mod ground;
 mod layer;
+mod linear;
+pub mod matching;
 pub mod roam;
 mod search;
