@@ -87,6 +87,11 @@ pub trait Distances {
     /// What is nearest to a point; nothing where all is farther than the field reaches, or outside it.
     fn nearest(&self, at: Point) -> Option<Nearest>;
 
+    /// The square of the distance to what is nearest (m²); nothing where that is farther than the field reaches.
+    fn square(&self, at: Point) -> Option<f64> {
+        self.nearest(at).map(|nearest| nearest.distance * nearest.distance)
+    }
+
     /// The lower left and the upper right corner of what the field covers (m).
     fn bounds(&self) -> (Point, Point);
 

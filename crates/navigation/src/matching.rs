@@ -101,8 +101,6 @@ impl core::fmt::Display for NoMatch {
 
 impl core::error::Error for NoMatch {}
 
-/// So many beams must have come back.
-const RETURNS: usize = 10;
 /// So the limit shrinks when a step was shorter than so much of it: faster, one guess in some hundreds that are off by decimetres was caught
 /// between two walls.
 const NARROWER: f64 = 0.65;
@@ -120,7 +118,7 @@ pub fn match_scan(
     guess: Pose,
     params: &MatchParams,
 ) -> Result<Match, NoMatch> {
-    if scan.beams().len() < RETURNS {
+    if scan.is_poor() {
         return Err(NoMatch::FewReturns);
     }
     // A radian moves the points by about so much, so that a step of the heading is as long as one of the place.

@@ -161,6 +161,14 @@ impl Distances for PlanField {
         (least <= REACH * REACH).then(|| self.elements[usize::from(best)].nearest(at))
     }
 
+    #[inline]
+    fn square(&self, at: Point) -> Option<f64> {
+        let rivals = self.rivals(at)?.iter().take_while(|one| **one != NONE);
+        let least =
+            rivals.map(|one| self.elements[usize::from(*one)].square(at)).fold(f64::INFINITY, f64::min);
+        (least <= REACH * REACH).then_some(least)
+    }
+
     fn bounds(&self) -> (Point, Point) {
         let room = Point::new(REACH, REACH);
         let size = Point::new(f64::from(self.width), f64::from(self.height)) * self.cell;

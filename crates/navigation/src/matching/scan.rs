@@ -6,6 +6,9 @@ use types::{Point, Pose};
 /// So many beams of a scan are kept at most.
 pub const MOST_BEAMS: usize = 256;
 
+/// So many beams must have come back.
+const RETURNS: usize = 10;
+
 /// How the beams of a scan lie.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Geometry {
@@ -71,6 +74,11 @@ impl Scan {
     /// The beams that came back.
     pub fn beams(&self) -> &[Beam] {
         &self.beams
+    }
+
+    /// Whether too few came back to tell anything.
+    pub fn is_poor(&self) -> bool {
+        self.beams.len() < RETURNS
     }
 
     /// How far its points are from the body in the mean square (m); one where there are none.

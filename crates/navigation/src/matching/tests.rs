@@ -1,53 +1,10 @@
 use super::*;
-use crate::floor::{Block, Disc, FloorPlan, GridField, PlanField};
+use crate::floor::{FloorPlan, GridField, PlanField};
+use crate::laboratory::{exact, geometry, noisy, room, taken};
 use crate::linear::{inverse, product};
 use types::chance::Stream;
-use types::geometry::PI;
 
 const NOISE: f64 = 0.01;
-
-fn geometry(beams: usize) -> Geometry {
-    Geometry {
-        angle_min: -PI / 2.0,
-        angle_step: PI / (beams - 1) as f64,
-        range_min: 0.02,
-        range_max: 8.0,
-        mount: Pose::new(0.08, 0.0, 0.0),
-    }
-}
-
-/// The ranges that a laser without noise measures.
-fn exact(floor: &PlanField, geometry: &Geometry, pose: Pose, beams: usize) -> Vec<f64> {
-    let laser = pose.then(geometry.mount);
-    let range = |i: usize| {
-        let bearing = laser.heading + geometry.angle_min + i as f64 * geometry.angle_step;
-        floor
-            .cast(laser.position(), Point::polar(1.0, bearing), geometry.range_max)
-            .unwrap_or(geometry.range_max)
-    };
-    (0..beams).map(range).collect()
-}
-
-fn noisy(exact: &[f64], noise: f64, draw: Stream) -> Vec<f32> {
-    let far = 8.0;
-    let range = |(i, range): (usize, &f64)| {
-        if *range < far { (range + noise * draw.normal(i as u64)).min(far) as f32 } else { far as f32 }
-    };
-    exact.iter().enumerate().map(range).collect()
-}
-
-fn taken(ranges: &[f32], geometry: &Geometry) -> Scan {
-    let mut scan = Scan::new();
-    scan.take(ranges, geometry, MOST_BEAMS);
-    scan
-}
-
-fn room() -> FloorPlan {
-    let mut plan = FloorPlan::room(6.0, 4.5);
-    plan.boxes.push(Block { at: Pose::new(4.6, 3.2, 0.4), length: 1.2, depth: 0.5 });
-    plan.discs.push(Disc { centre: Point::new(1.0, 3.4), radius: 0.3 });
-    plan
-}
 
 /// The bound of Cramér and Rao: what ranges of this noise can tell of the pose, from how they change when it changes.
 fn bound(floor: &PlanField, geometry: &Geometry, pose: Pose, beams: usize) -> Matrix {
