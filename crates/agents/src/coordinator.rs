@@ -1,20 +1,29 @@
 //! The coordinator: one command for the drive out of the wishes of many.
 //!
 //! ```text
-//!  offers ──▶ × weight of the decision ──▶ veto of safety ──▶ fusion ──▶ command
+//!  offers ──▶ × weight of the decision and of the mode ──▶ veto of safety ──▶ one by the method of the mode ──▶ command
 //! ```
+//!
+//! The methods are those of [`motion::coordination`]: competitive by priority or by layers, cooperative as vectors or by fuzzy logic. Which
+//! one counts, and who is heard at all, a mode says, and it may change with every message; without modes the parameter says it, and all are heard.
 
-use motion::fusion::{Cause, Held, Inference, Moment, Parameters, Veto, fuse};
+use motion::coordination::coordinate;
+use motion::fusion::{Cause, Held, Inference, Moment, Parameters, Veto};
 use runtime::{Agent, Fault, Input, Output, Step};
-use types::messages::{Decision, Odometry, Offer, Safety, Twist};
+use types::messages::{Coordination, Decision, MOST_AGENTS, Mode, Odometry, Offer, Safety, Twist};
 use types::params::Params;
-use types::{AgentId, Duration, Sequence, Time};
+use types::value::{Mistake, Table, nearest};
+use types::{AgentId, Duration, Sequence, Text, Time};
 
 use crate::shared::{Dated, Offers};
 
 /// How offers are fused.
 #[derive(Clone, Debug, Params)]
+#[params(check = whole)]
 pub struct CoordinatorParams {
+    /// How one command is made while no mode says it: "fuzzy", "vector-sum", "priority" or "subsumption". Without modes all have the same priority, and the greater weight stands above.
+    #[param(default = "fuzzy")]
+    pub coordination: Text<12>,
     /// What "much" means in speed (m/s). 0.6 is the highest speed of an indoor robot.
     #[param(default = 0.6, min = 0.01, max = 10.0)]
     pub linear_max: f64,
@@ -55,6 +64,25 @@ impl CoordinatorParams {
     }
 }
 
+/// What is wrong with the parameters that no range tells.
+fn whole(params: &CoordinatorParams, read: &Table) -> Vec<Mistake> {
+    let Some(entry) = read.get("coordination").filter(|_| method(&params.coordination).is_none()) else {
+        return Vec::new();
+    };
+    let said = entry.value.as_text().unwrap_or_default();
+    let words = Coordination::ALL.map(Coordination::word);
+    let what = format!("\"{said}\" is no way to coordinate");
+    let help = match nearest(said, words) {
+        Some(word) => format!("did you mean \"{word}\"?"),
+        None => format!("it is one of {}", words.map(|word| format!("\"{word}\"")).join(", ")),
+    };
+    vec![Mistake::new(entry.at, what).help(help)]
+}
+
+fn method<const N: usize>(word: &Text<N>) -> Option<Coordination> {
+    Coordination::ALL.into_iter().find(|method| method.word() == word.as_str())
+}
+
 /// Chooses and fuses what many agents wish the drive to do: each wish counts with the weight that the decision gives its sender, and
 /// safety has its veto before they are fused.
 #[derive(Agent)]
@@ -63,6 +91,8 @@ pub struct Coordinator {
     offers: Input<Offer>,
     /// The weights of the agents, by name.
     decision: Input<Decision>,
+    /// Who is heard, who stands above whom, and how one command is made of it. Once wired, nobody is heard before a mode says so.
+    mode: Input<Mode>,
     /// What is allowed. Once wired, its silence forbids to move forward.
     safety: Input<Safety>,
     /// How the robot moves: "speed up" begins there.
@@ -82,6 +112,11 @@ impl Agent for Coordinator {
         if let Some(decision) = self.decision.latest() {
             self.council.listen(&decision, |name| step.agent_named(name));
         }
+        if let Some(mode) = self.mode.latest() {
+            self.council.change(&mode, |name| step.agent_named(name));
+        } else if self.mode.is_wired() && self.council.mode.is_none() {
+            self.council.change(&Mode::default(), |_| None);
+        }
         if let Some(received) = self.safety.newest() {
             self.council.safety = Some(Dated { value: *received, stamp: received.header().stamp });
         }
@@ -99,14 +134,37 @@ impl Agent for Coordinator {
 #[derive(Clone, Copy, Debug, Default)]
 struct Council {
     offers: Offers,
-    weights: Sequence<(AgentId, f64), 12>,
+    weights: Sequence<(AgentId, f64), MOST_AGENTS>,
+    mode: Option<Heard>,
     safety: Option<Dated<Safety>>,
     motion: Twist,
     held: Held,
     silent: bool,
 }
 
+/// A mode, with the numbers of the agents that it names.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Heard {
+    name: types::Name,
+    method: Coordination,
+    rows: Sequence<(AgentId, f64, u32), MOST_AGENTS>,
+}
+
 impl Council {
+    /// Takes over a mode. With another one what was commanded in the last is not held.
+    fn change(&mut self, mode: &Mode, find: impl Fn(&str) -> Option<AgentId>) {
+        let row =
+            |row: &types::messages::ModeRow| Some((find(row.agent.as_str())?, row.weight, row.priority));
+        let heard = Heard {
+            name: mode.name,
+            method: mode.coordination,
+            rows: mode.rows.iter().filter_map(row).collect(),
+        };
+        if self.mode.replace(heard).is_some_and(|before| before.name != heard.name) {
+            self.held = Held::default();
+        }
+    }
+
     /// Takes over a decision. Names are looked up each time: an agent that was taken out and put in again has another number.
     fn listen(&mut self, decision: &Decision, find: impl Fn(&str) -> Option<AgentId>) {
         let rows = decision.rows.iter();
@@ -115,11 +173,23 @@ impl Council {
 
     fn command(&mut self, params: &CoordinatorParams, guarded: bool, now: Time) -> Twist {
         let moment = Moment { now, present: self.motion, veto: self.veto(params, guarded, now) };
-        let weights = &self.weights;
-        let offers = self.offers.weighed(|sender| {
+        let (weights, mode) = (&self.weights, &self.mode);
+        let decided = |sender| {
             weights.iter().find(|(known, _)| *known == sender).map_or(params.unlisted, |(_, weight)| *weight)
+        };
+        let (offers, priorities) = self.offers.ranked(|sender| match mode {
+            None => (decided(sender), 0),
+            Some(mode) => mode
+                .rows
+                .iter()
+                .find(|(known, ..)| *known == sender)
+                .map_or((0.0, 0), |(_, weight, priority)| (weight * decided(sender), *priority)),
         });
-        let fused = fuse(&params.fusion(), offers, &moment, &mut self.held);
+        let method = match mode {
+            Some(mode) => mode.method,
+            None => method(&params.coordination).unwrap_or_default(),
+        };
+        let fused = coordinate(method, &params.fusion(), offers, priorities, &moment, &mut self.held);
         self.offers.forget_expired(now);
         let silent = fused.cause == Cause::Silence;
         if silent && !self.silent {
@@ -188,6 +258,53 @@ mod tests {
         assert_eq!(drive(&[("safety", 1.0), ("wall", 0.0)]), Twist::new(0.0, 0.7));
         assert_eq!(drive(&[("safety", 0.0), ("wall", 1.0)]), Twist::new(0.4, -0.2));
         assert_eq!(drive(&[("safety", 0.0)]), Twist::new(0.4, -0.2), "who is not listed counts");
+    }
+
+    fn mode(name: &str, coordination: Coordination, rows: &[(&str, u32)]) -> Mode {
+        let row = |(agent, priority): &(&str, u32)| types::messages::ModeRow {
+            agent: (*agent).into(),
+            weight: 1.0,
+            priority: *priority,
+        };
+        Mode { name: name.into(), coordination, rows: rows.iter().map(row).collect(), ..Mode::default() }
+    }
+
+    #[test]
+    fn a_mode_says_who_is_heard_and_how_and_may_change_while_it_runs() {
+        let params = CoordinatorParams::default();
+        let mut council = council(&[]);
+        let mut drive = |mode: &Mode| {
+            council.change(mode, find);
+            council.command(&params, false, Time::ZERO)
+        };
+        let (safety_first, wall_first) = ([("safety", 2), ("wall", 1)], [("safety", 1), ("wall", 2)]);
+        let by_priority = |rows| mode("one", Coordination::Priority, rows);
+        assert_eq!(drive(&by_priority(&safety_first)), Twist::new(0.0, 0.7));
+        assert_eq!(drive(&by_priority(&wall_first)), Twist::new(0.4, -0.2));
+        let sum = drive(&mode("sum", Coordination::VectorSum, &wall_first));
+        assert!((sum.linear - 0.2).abs() < 1e-12 && (sum.angular - 0.25).abs() < 1e-12, "{sum:?}");
+        assert_eq!(
+            drive(&by_priority(&[("safety", 1)])),
+            Twist::new(0.0, 0.7),
+            "who is not named is not heard"
+        );
+        assert_eq!(
+            drive(&mode("idle", Coordination::Priority, &[])),
+            Twist::ZERO,
+            "at once: nothing is held"
+        );
+    }
+
+    #[test]
+    fn an_unknown_way_to_coordinate_is_a_mistake_with_the_nearest_right_one() {
+        use types::value::Value;
+        let mut table = Table::new();
+        table.set("coordination", Value::Text("priorty".into()));
+        let read = CoordinatorParams { coordination: "priorty".into(), ..CoordinatorParams::default() };
+        let mistakes = whole(&read, &table);
+        assert_eq!(mistakes.len(), 1);
+        assert!(format!("{:?}", mistakes[0]).contains("did you mean \\\"priority\\\""), "{mistakes:?}");
+        assert!(whole(&CoordinatorParams::default(), &Table::new()).is_empty());
     }
 
     #[test]

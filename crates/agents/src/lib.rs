@@ -15,7 +15,10 @@
 //! | [`image_tracker`] | HSI picture, head | the target, wishes for feet and head |
 //! | [`recogniser`] | a picture, head | whether a thing of a colour and shape is there, and where |
 //! | [`path_planner`] | ranges, odometry | a way to a place, and how good it is |
-//! | [`coordinator`] | wishes, safety, decision | one command for the drive |
+//! | [`navigation`] | goals and manoeuvres of people and programs | tasks, and what becomes of them |
+//! | [`process_supervisor`] | tasks, who lives | the mode: who is heard, and how |
+//! | [`real_time_supervisor`] | modes, tasks, reports of actions | the same for the real-time side, together; standing when one is silent |
+//! | [`coordinator`] | wishes, safety, decision, mode | one command for the drive |
 //! | [`decision_maker`] | safety, target, risk, battery, odometry, load, signals | situations, goal, everybody's weight and orders, reasons |
 //! | [`resource_manager`] | the load of the computer, orders | periods, methods, budgets and rest for all |
 //! | [`drive`] | a command, orders of people, a reflex | what the wheels can do of it |
@@ -32,8 +35,11 @@ pub mod head;
 pub mod image_tracker;
 pub mod laser;
 pub mod lookout;
+pub mod navigation;
 pub mod odometry;
 pub mod path_planner;
+pub mod process_supervisor;
+pub mod real_time_supervisor;
 pub mod recogniser;
 pub mod resource_manager;
 pub mod safety_monitor;
@@ -50,8 +56,11 @@ pub use head::PanTilt;
 pub use image_tracker::ImageTracker;
 pub use laser::Laser;
 pub use lookout::Lookout;
+pub use navigation::Navigation;
 pub use odometry::DeadReckoning;
 pub use path_planner::PathPlanner;
+pub use process_supervisor::ProcessSupervisor;
+pub use real_time_supervisor::RealTimeSupervisor;
 pub use recogniser::Recogniser;
 pub use resource_manager::ResourceManager;
 pub use safety_monitor::SafetyMonitor;
@@ -71,6 +80,9 @@ pub fn registry() -> runtime::Registry {
         ImageTracker,
         Recogniser,
         PathPlanner,
+        Navigation,
+        ProcessSupervisor,
+        RealTimeSupervisor,
         PanTilt,
         Coordinator,
         DriveBase,
@@ -98,6 +110,9 @@ mod tests {
             "image-tracker",
             "recogniser",
             "path-planner",
+            "navigation",
+            "process-supervisor",
+            "real-time-supervisor",
             "head",
             "coordinator",
             "drive",

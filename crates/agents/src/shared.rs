@@ -95,6 +95,8 @@ pub(crate) struct Offers {
     senders: [AgentId; SHARES_MAX],
     /// What each of them offers, with the weight that was last given to it. They lie as they are fused, so that nothing is copied.
     rows: [(Offer, f64); SHARES_MAX],
+    /// Who stands above whom, in the same order.
+    priorities: [u32; SHARES_MAX],
     len: usize,
     /// Offers that found no place among those that still hold.
     pub(crate) turned_away: u64,
@@ -105,6 +107,7 @@ impl Default for Offers {
         Offers {
             senders: [AgentId::NONE; SHARES_MAX],
             rows: [(Offer::default(), 0.0); SHARES_MAX],
+            priorities: [0; SHARES_MAX],
             len: 0,
             turned_away: 0,
         }
@@ -144,11 +147,17 @@ impl Offers {
 
     /// The offers, each with what `weight` says of its sender.
     pub(crate) fn weighed(&mut self, weight: impl Fn(AgentId) -> f64) -> &[(Offer, f64)] {
+        self.ranked(|sender| (weight(sender), 0)).0
+    }
+
+    /// The offers, each with the weight that `standing` gives its sender, and their priorities.
+    pub(crate) fn ranked(&mut self, standing: impl Fn(AgentId) -> (f64, u32)) -> (&[(Offer, f64)], &[u32]) {
         let rows = &mut self.rows[..self.len];
-        for ((_, weighs), sender) in rows.iter_mut().zip(&self.senders) {
-            *weighs = weight(*sender);
+        let priorities = &mut self.priorities[..self.len];
+        for (((_, weighs), rank), sender) in rows.iter_mut().zip(priorities.iter_mut()).zip(&self.senders) {
+            (*weighs, *rank) = standing(*sender);
         }
-        rows
+        (rows, priorities)
     }
 }
 

@@ -174,6 +174,17 @@ impl Fused {
     pub fn shares(&self) -> &[Share] {
         &self.shares[..self.listed]
     }
+
+    /// Of so many offers, of which nothing is said yet.
+    pub(crate) fn of(offers: usize) -> Fused {
+        let mut out = Fused { listed: offers.min(SHARES_MAX), ..Fused::default() };
+        (0..out.listed).for_each(|i| out.shares[i].offer = i);
+        out
+    }
+
+    pub(crate) fn shares_mut(&mut self) -> &mut [Share] {
+        &mut self.shares[..self.listed]
+    }
 }
 
 /// The last command, for holding it.
@@ -229,6 +240,41 @@ pub fn fuse(parameters: &Parameters, offers: &[(Offer, f64)], moment: &Moment, h
         held.last = Some((out.twist, since));
     }
     out
+}
+
+/// Of what an offer that counts speaks.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Axes {
+    /// Of the speed.
+    pub(crate) along: bool,
+    /// Of turning.
+    pub(crate) around: bool,
+    /// It says stop.
+    pub(crate) stop: bool,
+    /// Its weight times that which it was given.
+    pub(crate) weight: f64,
+}
+
+/// Of what an offer speaks, or why it does not count.
+pub(crate) fn axes(parameters: &Parameters, row: &(Offer, f64), moment: &Moment) -> Result<Axes, Fate> {
+    let round = Round { parameters, offers: &[], moment };
+    let (wish, weight) = round.live(row)?;
+    let (along, around) = (wish.along() > 0.0, wish.around() > 0.0);
+    Ok(Axes { along, around, stop: wish == Wish::Stop, weight })
+}
+
+/// Notes and counts that an offer does not count.
+pub(crate) fn refuse(out: &mut Fused, offer: usize, fate: Fate) {
+    out.expired += usize::from(fate == Fate::Expired);
+    out.refused += usize::from(fate == Fate::Refused);
+    if let Some(share) = out.shares_mut().get_mut(offer) {
+        share.fate = fate;
+    }
+}
+
+/// Keeps a command as the last one.
+pub(crate) fn hold(held: &mut Held, twist: Twist, moment: &Moment) {
+    held.last = Some((twist, moment.now));
 }
 
 /// What an offer wishes, on the axes it speaks of.

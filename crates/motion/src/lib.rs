@@ -8,11 +8,19 @@
 //! | [`kinematics`] | wheel speeds for a motion of the body, and back |
 //! | [`odometry`] | where the body is, from wheel counters |
 //! | [`heading`] | how far the body turned, from a gyro and the wheels |
+//! | [`blend`] | where the body is on the map, without jumps, from odometry and a localizer |
 //! | [`motor`] | how a wheel under speed control follows its set point |
 //! | [`limits`] | what of a wish can be driven |
+//! | [`profile`] | the fastest motion along an axis within velocity, acceleration and jerk |
+//! | [`steering`] | closed-loop steering to a pose |
+//! | [`trajectory`] | staying with a pose that moves |
+//! | [`goto`] | going to a point, a pose or a dock |
+//! | [`manoeuvre`] | a velocity for a time, a distance, an angle, a point |
+//! | [`track`] | following a path |
 //! | [`fuzzy`] | terms, hedges, inference |
 //! | [`word`] | commands in words |
 //! | [`fusion`] | one command out of many offers |
+//! | [`coordination`] | the same by priority, by layers, as vectors, or fused |
 //! | [`ring`] | ranges around the robot, of a few sonars or of a laser |
 //! | [`safety`] | how fast is still safe, and where there is room |
 //! | [`wall`] | steering along a wall |
@@ -24,17 +32,25 @@
 #[cfg(test)]
 extern crate std;
 
+pub mod blend;
 pub mod boundary;
+pub mod coordination;
 pub mod fusion;
 pub mod fuzzy;
+pub mod goto;
 pub mod heading;
 pub mod kinematics;
 pub mod limits;
+pub mod manoeuvre;
 pub mod motor;
 pub mod odometry;
+pub mod profile;
 pub mod pursuit;
 pub mod ring;
 pub mod safety;
+pub mod steering;
+pub mod track;
+pub mod trajectory;
 pub mod wall;
 pub mod word;
 

@@ -259,6 +259,9 @@ pub(crate) struct Router {
     now: Time,
     /// What admission counts with; nothing where everything is admitted.
     admission: Option<Admission>,
+    /// What was analysed last, and how often that was done.
+    analysed: Option<Arc<admission::Analysed>>,
+    analyses: u64,
     /// By how many percent of what was measured of late the next step is counted, where steps are measured: in simulated time what the host
     /// took for them says nothing, and what they were played to take is exact.
     pub measures: Option<i64>,
@@ -306,6 +309,8 @@ impl Router {
             past: WireTotals::default(),
             now: Time::ZERO,
             admission: None,
+            analysed: None,
+            analyses: 0,
             measures: None,
             as_declared: false,
             grown_at: Time(i64::MIN / 2),

@@ -9,7 +9,7 @@
 //! | what makes a run a success | [`goal`] |
 //! | what a seed changes | [`vary`], with [`free_way`] |
 //! | plain data to draw | [`snapshot`] |
-//! | rays, grid and chance underneath | [`shape`], `field`, [`types::chance`] |
+//! | rays, grid and chance underneath | [`shape`], `solid`, `field`, [`types::chance`] |
 //!
 //! There is no clock, file, thread or generator here. The same plan, seed and commands give the same bytes.
 #![forbid(unsafe_code)]
@@ -29,6 +29,7 @@ mod robot;
 pub mod shape;
 pub mod simulator;
 pub mod snapshot;
+mod solid;
 mod sonar;
 pub mod vary;
 

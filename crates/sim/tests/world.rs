@@ -9,6 +9,7 @@ use types::geometry::{PI, TAU, wrap};
 use types::value::{Span, Table, Value};
 use types::{Duration, Point, Pose, Time};
 
+mod body;
 mod common;
 mod home;
 

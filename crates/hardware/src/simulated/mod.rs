@@ -90,28 +90,26 @@ pub fn raise(plan: &WorldPlan, seed: u64, robots: &[Robot]) -> Result<(Vec<Simul
 /// What a robot of this model is to its gate.
 pub fn describe(model: &Model) -> RobotDescription {
     let mut description = RobotDescription::bare("sim", ClockKind::Simulated);
-    let second = Duration::secs(1);
     description.periods = Periods {
-        // All cones at once: a ring fired in three groups of four at six metres takes a good 0.1 s, and 0.25 s leaves room.
-        sonar: model.sonar.map(|_| Duration::millis(250)),
-        scan: model.laser.map(|_| Duration::millis(100)),
-        image: model.camera.map(|_| Duration(second.0 / 15 + 1)),
-        ticks: Some(Duration::millis(20)),
-        bumper: Some(Duration::millis(100)),
-        gyro: Some(Duration::millis(10)),
-        battery: Some(second),
-        head: Some(Duration::millis(50)),
+        sonar: model.sonar.map(|sonar| sonar.period),
+        scan: model.laser.map(|laser| laser.period),
+        image: model.camera.map(|camera| camera.period),
+        ticks: Some(model.drive.period),
+        bumper: Some(model.bumper_period),
+        gyro: Some(model.gyro.period),
+        battery: Some(model.battery.period),
+        head: Some(model.head.period),
         pose: None,
     };
     if let Some(laser) = &model.laser {
-        description.mount(LASER, Pose::default(), laser.height);
+        description.mount(LASER, laser.mount(), laser.height);
         description.beams = laser.beams as usize;
     }
     if let Some(camera) = &model.camera {
         description.mount(CAMERA, Pose::default(), camera.mount);
         description.picture = camera.width as usize * camera.height as usize * 3;
     }
-    for (k, place) in ring(model).into_iter().enumerate() {
+    for (k, place) in model.ring().into_iter().enumerate() {
         description.mount(&format!("sonar_{k}"), place, model.sonar.map_or(0.0, |sonar| sonar.height));
     }
     description.limits = Some(limits(model));
@@ -137,17 +135,6 @@ fn limits(model: &Model) -> Limits {
         wheel_max: drive.max_wheel_speed,
         drive: Differential::new(drive.wheel_radius, drive.axle),
     }
-}
-
-/// Where the sonars sit on the rim and look.
-fn ring(model: &Model) -> Vec<Pose> {
-    let count = model.sonar.map_or(0, |sonar| sonar.count);
-    let place = |k: u32| {
-        let bearing = types::geometry::TAU * f64::from(k) / f64::from(count);
-        let at = types::Point::polar(model.radius, bearing);
-        Pose::new(at.x, at.y, types::geometry::wrap(bearing))
-    };
-    (0..count).map(place).collect()
 }
 
 /// When each sensor of one robot is read.
@@ -225,7 +212,7 @@ fn empty_ring(model: &Model) -> Echoes {
         range_min: sonar.min_range as f32,
         range_max: sonar.max_range as f32,
         cone: (2.0 * sonar.half_angle) as f32,
-        echoes: ring(model).into_iter().map(echo).collect(),
+        echoes: model.ring().into_iter().map(echo).collect(),
     }
 }
 
@@ -238,6 +225,9 @@ fn empty_scan(model: &Model) -> LaserScan {
         angle_step: (sim::laser::beam_angle(laser, 1) - first) as f32,
         range_min: 0.0,
         range_max: laser.max_range as f32,
+        mount_x: laser.x as f32,
+        mount_y: laser.y as f32,
+        mount_heading: laser.heading as f32,
         ..LaserScan::default()
     }
 }

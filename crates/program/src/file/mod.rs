@@ -12,7 +12,7 @@
 //! | TOML to a tree of values | `tree` |
 //! | built-in scenarios and worlds, and files by name | `library` |
 //! | `--set KEY=VALUE` | `set` |
-//! | the tree to a plan, with all mistakes | `read`, with `agent`, `group`, `wires`, `decide`, `knowledge`, `requests` |
+//! | the tree to a plan, with all mistakes | `read`, with `agent`, `group`, `wires`, `decide`, `modes`, `knowledge`, `requests`, `spoken` |
 //! | the plan to a text | `write` |
 
 mod agent;
@@ -22,10 +22,12 @@ mod decide;
 mod group;
 pub(crate) mod knowledge;
 mod library;
+mod modes;
 mod read;
 mod requests;
 mod set;
 mod sources;
+mod spoken;
 mod syntax;
 pub(crate) mod tree;
 mod wires;
@@ -39,6 +41,7 @@ pub(crate) use read::SECTIONS;
 pub use read::{Loaded, check, load, read, read_plan};
 pub(crate) use set::set_in;
 pub use sources::{Mistakes, Sources};
+pub(crate) use spoken::in_bytes;
 pub use write::write_plan;
 
 use types::value::{Table, Value};

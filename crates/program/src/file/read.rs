@@ -16,7 +16,7 @@ use super::group::Names;
 use super::library::Shelf;
 use super::sources::{Mistakes, Sources};
 use super::wires::Written;
-use super::{burden, compare, decide, knowledge, set, tree};
+use super::{burden, compare, decide, knowledge, modes, set, tree};
 
 /// The sections of a system file.
 pub(crate) const SECTIONS: [&str; 16] = [
@@ -207,6 +207,7 @@ impl<'r> Reader<'r> {
         self.settle_wires();
         self.requests(tree);
         decide::read(self, tree);
+        modes::read(self);
         burden::read(self, tree);
         compare::read(self, tree);
         knowledge::read(self, tree);
@@ -364,7 +365,7 @@ impl<'r> Reader<'r> {
             }
             Some(Err(error)) => self.mistakes.push(Mistake::new(place, error.to_string())),
             Some(Ok(hardware::Spec::Simulated)) => {
-                Model::h1().overridden(model, at, &OF_ROBOT, &mut self.mistakes);
+                Model::read(model, at, &OF_ROBOT, &mut self.mistakes);
             }
             Some(Ok(_)) => {
                 let gate = self.registry.get(ROBOT).map(|kind| kind.params.iter().map(|field| field.name));

@@ -174,7 +174,15 @@ impl One<'_> {
             );
         }
         let mut plan = ready.plan.clone();
-        let firings = self.knowing.map(|knowing| knowing.firings(self.clock, self.limit(&ready)));
+        let mut firings = self.knowing.map(|knowing| knowing.firings(self.clock, self.limit(&ready)));
+        let spoken = plan.requests.iter_mut().map(|request| &mut request.words);
+        let scheduled = firings.iter_mut().flatten().map(|firing| &mut firing.words);
+        for words in spoken.chain(scheduled) {
+            // What is no message of its port is refused at its time, as everything that is wrong by then.
+            if let Ok(bytes) = file::in_bytes(words, |name| ready.port(name)) {
+                *words = bytes;
+            }
+        }
         let asked = Asked::of(&mut plan, firings.unwrap_or_default(), self.repeat.as_ref());
         let log = self.log(&ready, &asked)?;
         let facts = log.as_ref().map(|(_, facts, _)| facts.clone());

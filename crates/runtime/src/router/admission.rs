@@ -1,6 +1,10 @@
 //! Whether all deadlines are still met when something is changed: what makes somebody miss its own is refused, with the numbers.
 
+mod reach;
+mod room;
+
 use std::collections::HashMap;
+use std::sync::Arc;
 
 use schedule::Exact;
 use schedule::sensitivity::largest;
@@ -9,8 +13,10 @@ use types::{Duration, Time};
 
 use super::{Incident, Reply, Router};
 use crate::plan::{AgentPlan, Plan};
-use crate::request::{Refusal, Request};
+use crate::request::Refusal;
 use crate::timetable::{Assumed, timetable, why_unsound};
+
+pub(super) use self::reach::Asked;
 
 /// What admission counts with.
 #[derive(Clone, Debug, Default)]
@@ -36,44 +42,84 @@ const WINDOW: Duration = Duration::secs(10);
 /// How often it is looked whether somebody has outgrown what it was admitted with.
 const GROWN_EVERY: Duration = Duration::millis(50);
 
-/// A system and what the analysis found of it.
-pub(super) struct Judged {
-    names: Vec<String>,
+/// A system, and what the analysis found of it.
+pub(super) struct Analysed {
     system: System,
     found: Vec<Found>,
 }
 
+/// A running system and what the analysis found of it.
+pub(super) struct Judged {
+    /// Its agents stand in the order of the analysed system's.
+    plan: Plan,
+    of: Arc<Analysed>,
+}
+
 impl Judged {
+    fn names(&self) -> impl Iterator<Item = &str> {
+        self.plan.agents.iter().map(|agent| agent.name.as_str())
+    }
+
+    fn name(&self, at: usize) -> &str {
+        &self.plan.agents[at].name
+    }
+
     fn miss(&self, name: &str) -> bool {
-        self.names.iter().position(|known| known == name).is_some_and(|at| self.misses(at))
+        self.names().position(|known| known == name).is_some_and(|at| self.misses(at))
     }
 
     fn misses(&self, at: usize) -> bool {
-        self.system.is_in_real_time(at) && !self.found[at].meets
+        self.of.system.is_in_real_time(at) && !self.of.found[at].meets
+    }
+
+    /// How long each in real time takes at worst.
+    #[cfg(all(test, not(loom)))]
+    pub(super) fn responses(&self) -> std::collections::BTreeMap<String, Option<Exact>> {
+        let in_real_time = self.names().enumerate().filter(|(at, _)| self.of.system.is_in_real_time(*at));
+        in_real_time.map(|(at, name)| (name.to_owned(), self.of.found[at].response)).collect()
+    }
+
+    /// Whether an agent has to be in time: all have but those who were late before.
+    fn must(&self, at: usize, before: Option<&Judged>) -> bool {
+        before.is_none_or(|before| !before.miss(self.name(at)))
+    }
+
+    /// Who has to be in time and is not.
+    fn late(&self, before: Option<&Judged>) -> Vec<usize> {
+        let all = 0..self.plan.agents.len();
+        all.filter(|at| self.misses(*at) && self.must(*at, before)).collect()
+    }
+
+    /// How late these are.
+    fn missed(&self, late: &[usize]) -> String {
+        let said: Vec<String> = late.iter().take(3).map(|at| self.said(*at)).collect();
+        let more = late.len().saturating_sub(3);
+        let more = if more > 0 { format!("; and {more} more") } else { String::new() };
+        format!("the deadlines would not be met: {}{more}", said.join("; "))
     }
 
     fn said(&self, at: usize) -> String {
-        let deadline = people(self.system.agents[at].deadline);
-        match self.found[at].response {
+        let deadline = people(self.of.system.agents[at].deadline);
+        match self.of.found[at].response {
             Some(response) => format!(
                 "{} would be done after {} at worst, and has {deadline}",
-                self.names[at],
+                self.name(at),
                 people(response)
             ),
-            None => format!("{} might never be done: more is asked for than there is", self.names[at]),
+            None => format!("{} might never be done: more is asked for than there is", self.name(at)),
         }
     }
 
     /// The least period of an agent with which all that were in time before are so again.
     fn least_period(&self, name: &str, must: &[usize]) -> Option<Duration> {
-        let at = self.names.iter().position(|known| known == name)?;
-        let nominal = self.system.agents[at].sources.iter().find_map(|source| match source {
+        let at = self.names().position(|known| known == name)?;
+        let nominal = self.of.system.agents[at].sources.iter().find_map(|source| match source {
             Source::Clock { period } => Some(*period),
             _ => None,
         })?;
-        let keeps_pace = self.system.agents[at].deadline == nominal;
+        let keeps_pace = self.of.system.agents[at].deadline == nominal;
         let fits = |slower: Exact| {
-            let mut system = self.system.clone();
+            let mut system = self.of.system.clone();
             let agent = &mut system.agents[at];
             for source in &mut agent.sources {
                 if let Source::Clock { period } = source {
@@ -107,13 +153,17 @@ impl Router {
         self.admission = admission;
     }
 
-    /// What the analysis says of the system as it is; nothing where nobody asks.
+    /// Whether changes are held against deadlines.
+    pub(super) fn admits(&self) -> bool {
+        self.admission.is_some()
+    }
+
+    /// What the analysis says of the system as it is; nothing where nobody asks. What was analysed last is not analysed again.
     pub(super) fn judged(&mut self) -> Reply<Option<Judged>> {
         if self.admission.is_none() {
             return Ok(None);
         }
         self.look_at_windows();
-        let Some(Admission { processors, overhead, pace, .. }) = &self.admission else { return Ok(None) };
         let parts = self.to_plan_as_it_is();
         let plan = Plan {
             agents: parts.0,
@@ -122,17 +172,30 @@ impl Router {
             executors: self.executors.iter().map(|executor| executor.plan.clone()).collect(),
             ..Plan::default()
         };
+        let system = self.system_of(&plan);
+        let of = match self.analysed.take() {
+            Some(last) if last.system == system => last,
+            _ => {
+                self.analyses += 1;
+                let found = system.analyse().map_err(|unsound| {
+                    let names: Vec<String> = plan.agents.iter().map(|agent| agent.name.clone()).collect();
+                    why_unsound(&unsound, &names)
+                })?;
+                Arc::new(Analysed { system, found })
+            }
+        };
+        self.analysed = Some(of.clone());
+        Ok(Some(Judged { plan, of }))
+    }
+
+    /// A plan as admission counts it.
+    fn system_of(&self, plan: &Plan) -> System {
+        let nobody = Admission::default();
+        let Admission { processors, overhead, pace, .. } = self.admission.as_ref().unwrap_or(&nobody);
         let cost = |agent: &AgentPlan| self.cost_of(agent);
         let pace = |port: &str| pace.get(port).copied();
-        let system = timetable(
-            &plan,
-            &self.registry,
-            &Assumed { cost: &cost, processors: *processors, overhead: *overhead, pace: &pace },
-        )
-        .system;
-        let names: Vec<String> = plan.agents.into_iter().map(|agent| agent.name).collect();
-        let found = system.analyse().map_err(|unsound| why_unsound(&unsound, &names))?;
-        Ok(Some(Judged { names, system, found }))
+        let assumed = Assumed { cost: &cost, processors: *processors, overhead: *overhead, pace: &pace };
+        timetable(plan, &self.registry, &assumed).system
     }
 
     /// Brings up to date what real-time agents took of late.
@@ -193,11 +256,19 @@ impl Router {
 
     /// Tells what was admitted though it does not fit.
     pub(crate) fn note_forced(&mut self) {
-        let refused = self.admit(None, None);
-        if let Err(refusal) = refused {
-            let what = format!("admitted by force: {}", refusal.what);
-            self.incidents.push(Incident { time: self.now, agent: "control".into(), what });
-        }
+        let what = match self.judged() {
+            Ok(None) => return,
+            Ok(Some(judged)) => {
+                let late = judged.late(None);
+                if late.is_empty() {
+                    return self.note_admitted(&judged);
+                }
+                judged.missed(&late)
+            }
+            Err(refusal) => refusal.what,
+        };
+        let what = format!("admitted by force: {what}");
+        self.incidents.push(Incident { time: self.now, agent: "control".into(), what });
     }
 
     /// Whether the system as it is may begin.
@@ -206,61 +277,50 @@ impl Router {
             self.note_forced();
             return Ok(());
         }
-        self.admit(None, None)
+        self.admit(None, &Asked::to_begin())
     }
 
     /// Keeps what agents were counted with; who has been told to have outgrown it stays as it is.
     fn note_admitted(&mut self, judged: &Judged) {
         let Some(Admission { overhead, .. }) = &self.admission else { return };
         let overhead = *overhead;
-        for (name, agent) in judged.names.iter().zip(&judged.system.agents) {
+        for (name, agent) in judged.names().zip(&judged.of.system.agents) {
             let cost = Duration(agent.cost.to_integer() as i64) - overhead;
             let Some(known) = self.names.get(name).and_then(|id| self.agents.get_mut(id)) else { continue };
             known.admitted = known.admitted.or(Some(cost));
         }
     }
 
+    /// The same of those who were admitted because they keep nobody waiting.
+    pub(super) fn note_unjudged(&mut self, names: &[String]) {
+        for name in names {
+            let Some(id) = self.names.get(name).copied() else { continue };
+            let cost = self.cost_of(&self.agents[&id].plan);
+            self.of_mut(id, |known| known.admitted = known.admitted.or(Some(cost)));
+        }
+    }
+
     /// Refuses what was staged where somebody misses its deadline by it who met it before.
-    pub(super) fn admit(&mut self, before: Option<&Judged>, request: Option<&str>) -> Reply<()> {
+    pub(super) fn admit(&mut self, before: Option<&Judged>, asked: &Asked) -> Reply<()> {
         let Some(judged) = self.judged()? else { return Ok(()) };
-        let late =
-            |at: &usize| judged.misses(*at) && before.is_none_or(|before| !before.miss(&judged.names[*at]));
-        let late: Vec<usize> = (0..judged.names.len()).filter(late).collect();
-        if late.is_empty() {
+        let late = judged.late(before);
+        let Some(first) = late.first() else {
             self.note_admitted(&judged);
             return Ok(());
-        }
-        let said: Vec<String> = late.iter().take(3).map(|at| judged.said(*at)).collect();
-        let more = late.len().saturating_sub(3);
-        let more = if more > 0 { format!("; and {more} more") } else { String::new() };
-        let name = request.unwrap_or(&judged.names[late[0]]);
-        let fits = Some(name).and_then(|name| judged.least_period(name, &late).map(|period| (name, period)));
-        let fits = fits.map_or(String::new(), |(name, period)| {
+        };
+        let name = asked.whose.as_deref().unwrap_or_else(|| judged.name(*first));
+        let own = judged.least_period(name, &late).map_or(String::new(), |period| {
             format!(
                 "{name} fits with a period of {}ms or longer; ",
                 (as_millis(period) * 1000.0).ceil() / 1000.0
             )
         });
-        Err(Refusal::new(format!("the deadlines would not be met: {}{more}", said.join("; ")))
-            .help(format!("{fits}--force does it all the same")))
+        let others = self.room_by_others(&judged, before, asked);
+        let others = others.map_or(String::new(), |room| format!("; or make room first, {room}"));
+        Err(Refusal::new(judged.missed(&late)).help(format!("{own}--force does it all the same{others}")))
     }
 }
 
 fn as_millis(span: Duration) -> f64 {
     span.0 as f64 * 1e-6
-}
-
-/// The agent whose timing a request changes, where it does.
-pub(super) fn changes_timing(request: &Request) -> Option<&str> {
-    match request {
-        Request::Add(plan) => Some(&plan.name),
-        Request::Set { agent, key, .. }
-            if key != "importance" && super::TIMING_KEYS.contains(&key.as_str()) =>
-        {
-            Some(agent)
-        }
-        Request::Wire(wire) => Some(crate::plan::owner(&wire.to)),
-        Request::All(requests) => requests.iter().find_map(changes_timing),
-        _ => None,
-    }
 }

@@ -12,7 +12,7 @@ use types::{AgentId, Filter, Priority};
 
 use super::asking::row_of_queue;
 use super::script::{Step, What};
-use super::{PortId, Reply, Router, Staged};
+use super::{Known, PortId, Reply, Router, Staged};
 use crate::composition::WireRow;
 use crate::door::bit_of;
 use crate::executor::Change;
@@ -138,6 +138,30 @@ impl Router {
     /// Whether this is the name of a queue.
     pub(super) fn is_queue(&self, name: &str) -> bool {
         self.queue_at(name).is_some()
+    }
+
+    /// Those whom messages of a queue make run.
+    pub(super) fn receivers_of_queue(&self, name: &str) -> impl Iterator<Item = &Known> {
+        let queue = self.queue_at(name).map(|at| &self.queues[at]);
+        queue.into_iter().flat_map(|queue| self.woken_by(queue))
+    }
+
+    /// Those that send into a queue.
+    pub(super) fn senders_of_queue(&self, name: &str) -> impl Iterator<Item = AgentId> {
+        let queue = self.queue_at(name).map(|at| &self.queues[at]);
+        queue.into_iter().flat_map(|queue| queue.senders.iter().map(|wire| wire.from.0))
+    }
+
+    /// Those whom an agent makes run by what it sends into queues.
+    pub(super) fn served_by(&self, id: AgentId) -> impl Iterator<Item = &Known> {
+        let queues =
+            self.queues.iter().filter(move |queue| queue.senders.iter().any(|wire| wire.from.0 == id));
+        queues.flat_map(|queue| self.woken_by(queue))
+    }
+
+    fn woken_by(&self, queue: &Queue) -> impl Iterator<Item = &Known> {
+        let receivers = queue.receivers.iter().filter_map(|wire| self.by_id(wire.to.0).zip(Some(wire.to.1)));
+        receivers.filter(|(known, port)| known.is_on(*port)).map(|(known, _)| known)
     }
 
     /// All queues with what they hold, and the wires to and from them.

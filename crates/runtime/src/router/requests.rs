@@ -2,7 +2,7 @@
 
 use types::Time;
 
-use super::admission::changes_timing;
+use super::admission::Asked;
 use super::{Fabric, OutsideCall, Reply, Router, Staged, timing_of};
 use crate::census::Given;
 use crate::plan::WirePlan;
@@ -91,13 +91,17 @@ impl Router {
 
     /// The same as [`stage`](Self::stage), and refuses it where deadlines would be missed by it that are met now.
     fn stage_admitted(&mut self, request: Request, staged: &mut Staged) -> Reply<()> {
-        let Some(name) = changes_timing(&request).map(str::to_owned) else {
-            return self.stage(request, staged);
-        };
+        let asked = if self.admits() { Asked::of(&request) } else { None };
+        let Some(asked) = asked else { return self.stage(request, staged) };
+        if !self.reaches_real_time(&request) {
+            self.stage(request, staged)?;
+            self.note_unjudged(&asked.own);
+            return Ok(());
+        }
         // What cannot be analysed as it is is no reason to refuse something else.
         let before = self.judged().ok().flatten();
         self.stage(request, staged)?;
-        self.admit(before.as_ref(), Some(&name))
+        self.admit(before.as_ref(), &asked)
     }
 
     /// Checks a request and writes it into the registry. When it is refused, what was written is to be taken back.

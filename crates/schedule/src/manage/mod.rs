@@ -32,6 +32,7 @@ mod change;
 mod concerned;
 mod governor;
 mod ladder;
+mod lengthen;
 mod room;
 mod search;
 mod work;
@@ -44,6 +45,7 @@ pub use budgets::budgets;
 pub use change::{Cause, Change, Late, Shift};
 pub use governor::{Governor, Patience};
 pub use ladder::Ladder;
+pub use lengthen::lengthen;
 pub use work::{Work, useful_work};
 
 use room::Room;

@@ -85,6 +85,12 @@ impl Room {
         Room { active: self.active, ..self.fixed_at(setting) }
     }
 
+    /// When nothing but its period may be asked of it.
+    pub(super) fn of_period_alone(&self) -> Room {
+        let fixed = self.fixed_at(self.most());
+        Room { period: self.period, give: self.give, ..fixed }
+    }
+
     /// When it need not give anything.
     pub(super) fn at_most(&self) -> Room {
         self.fixed_at(self.most())

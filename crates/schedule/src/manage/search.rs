@@ -37,6 +37,13 @@ impl<'a> Search<'a> {
         Search { system, managed, must, tests: Cell::new(0) }
     }
 
+    /// The same when of those in real time only these must meet their deadlines.
+    pub(super) fn only(mut self, asked_for: &[bool]) -> Search<'a> {
+        let asked_for = asked_for.iter().copied().chain(std::iter::repeat(false));
+        self.must.iter_mut().zip(asked_for).for_each(|(must, asked_for)| *must &= asked_for);
+        self
+    }
+
     /// The same when these need not meet their deadlines.
     pub(super) fn without(mut self, given_up: &[usize]) -> Search<'a> {
         given_up.iter().for_each(|at| self.must[*at] = false);

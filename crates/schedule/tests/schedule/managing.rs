@@ -3,7 +3,7 @@
 use proptest::prelude::*;
 use schedule::elastic::compress_to_deadlines;
 use schedule::manage::{
-    Anytime, Found, Managed, Orders, Setting, Stage, Way, Work, apply, budgets, manage, useful_work,
+    Anytime, Found, Managed, Orders, Setting, Stage, Way, Work, apply, budgets, lengthen, manage, useful_work,
 };
 use schedule::system::{Agent, Source, System};
 use schedule::utilization::liu_layland_bound;
@@ -273,6 +273,52 @@ fn stage_of(kinds: usize) -> Stage {
     [Stage::Nothing, Stage::Periods, Stage::Methods, Stage::Budgets, Stage::Lives][kinds]
 }
 
+#[test]
+fn room_for_one_comes_from_those_in_its_way_by_elasticity_over_importance() {
+    // 4 of 10, 8 of 20 and the one that comes, below both: 20 of 100 that it has to be done in. By hand, with as much as they want: no time left
+    // but 100 - 40 - 40 = 20 ms, which just fits; with 30 ms it is 10 too much.
+    let mut agents =
+        vec![clocked(4 * MS, 10 * MS, 0), clocked(8 * MS, 20 * MS, 1), clocked(20 * MS, 100 * MS, 2)];
+    agents.push(clocked(MS, 100 * MS, 3));
+    let system =
+        System { processors: 1, agents, executors: executors(&[(60, 1), (50, 1), (40, 1), (30, 1)]) };
+    let give = |importance| elastic(10 * MS, 40 * MS, 1.0, importance);
+    let mut managed =
+        vec![give(0.5), Managed { nominal: Some(n(20 * MS)), longest: Some(n(80 * MS)), ..give(0.5) }];
+    managed.extend([Managed::rigid(), elastic(100 * MS, 400 * MS, 1.0, 0.01)]);
+    let periods = |system: &System, managed: &[Managed], must: [bool; 4]| {
+        let settings = lengthen(system, managed, &must).unwrap()?;
+        Some(
+            settings
+                .iter()
+                .map(|it| it.period.map(|period| *period.numer() as f64 / 1e6))
+                .collect::<Vec<_>>(),
+        )
+    };
+    let three = [true, true, true, false];
+    let nominal = Some(vec![Some(10.0), Some(20.0), None, Some(100.0)]);
+    assert_eq!(periods(&system, &managed, three), nominal);
+    let mut more = system.clone();
+    more.agents[2].cost = n(30 * MS);
+    let both = periods(&more, &managed, three).unwrap();
+    // The one below is in nobody's way, and who is late there is not asked about.
+    assert_eq!(both[3], Some(100.0));
+    let used = |periods: &[Option<f64>]| [4.0 / periods[0].unwrap(), 8.0 / periods[1].unwrap()];
+    let [one, other] = used(&both);
+    assert!((one - other).abs() < 0.01 && one < 0.4, "equal springs of equal length: {both:?}");
+    // Who is twice as important gives half as much.
+    let mut unlike = managed.clone();
+    unlike[0].importance = 1.0;
+    let [one, other] = used(&periods(&more, &unlike, three).unwrap());
+    let (given, twice) = (0.4 - one, 0.4 - other);
+    assert!((twice / given - 2.0).abs() < 0.2, "{given} {twice}");
+    // Not even with all that they may give.
+    more.agents[2].cost = n(81 * MS);
+    assert_eq!(periods(&more, &managed, three), None);
+    // It is late, and was so before: nobody makes room for it.
+    assert_eq!(periods(&more, &managed, [true, true, false, false]), nominal);
+}
+
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(3000))]
 
@@ -296,6 +342,30 @@ proptest! {
             prop_assert!(setting.period >= most[at].period && setting.period <= least[at].period, "{at}");
             prop_assert!(setting.budget <= most[at].budget && setting.budget >= least[at].budget, "{at}");
             prop_assert!(setting.method <= least[at].method && setting.active >= least[at].active, "{at}");
+        }
+    }
+
+    /// Of periods alone it is the same, also where not everybody has to be in time; and where it is not enough nothing is.
+    #[test]
+    fn longer_periods_make_room_where_any_do(case in case(2..=6, 1), must in proptest::collection::vec(any::<bool>(), 6)) {
+        let is_late = |settings: &[Setting]| case.late(settings).into_iter().any(|at| must[at]);
+        let longest: Vec<Setting> = case.ordered().into_iter().zip(case.given(1))
+            .map(|(ordered, given)| Setting { period: given.period, ..ordered }).collect();
+        let Some(settings) = lengthen(&case.system, &case.managed, &must).unwrap() else {
+            prop_assert!(is_late(&longest));
+            return Ok(());
+        };
+        prop_assert!(!is_late(&settings));
+        for ((setting, ordered), longest) in settings.iter().zip(case.ordered()).zip(&longest) {
+            prop_assert_eq!(Setting { period: ordered.period, ..*setting }, ordered);
+            prop_assert!(setting.period >= ordered.period && setting.period <= longest.period);
+        }
+        if !is_late(&case.ordered()) {
+            prop_assert_eq!(&settings, &case.ordered());
+        }
+        let found = case.manage();
+        if must[..case.managed.len()].iter().all(|must| *must) && found.feasible && found.stage <= Stage::Periods {
+            prop_assert_eq!(settings, found.settings);
         }
     }
 

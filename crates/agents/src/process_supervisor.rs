@@ -1,0 +1,156 @@
+//! The process supervisor: what works in which mode, and what happens when something of that dies.
+//!
+//! ```text
+//!  people ─▶ change ─┐                        ┌▶ mode ─▶ real-time supervisor
+//!  navigation ─▶ tasks ─┴─▶ table of modes ───┴▶ task ─▶
+//!  router: who lives ─────▶ somebody died ─▶ the mode's "dies"
+//! ```
+//!
+//! It belongs to the ordinary side: it may take its time. That nobody drives on in the meantime the real-time supervisor sees to, which needs
+//! no table for it.
+
+mod modes;
+
+use runtime::{Agent, AgentState, Composition, Fault, Input, Output, Router, Service, Step};
+use types::Name;
+use types::messages::{Answer, Mode, Progress, Report, Task};
+use types::params::Params;
+use types::value::{Mistake, Table, nearest};
+
+pub use modes::{IDLE, ModeTable, RESERVED};
+
+/// The modes.
+#[derive(Clone, Debug, Params)]
+#[params(check = whole)]
+pub struct ProcessParams {
+    /// In each mode, who is heard: an agent's weight from 0 to 1, or a table of weight and priority, as in goto = { priority = 1 }. What else a mode says: `by`, how one command is made ("priority", where nothing is said; "subsumption", "vector-sum" or "fuzzy"), and `dies`, the mode that follows when one of its agents dies ("idle", where nothing is said). The mode "idle", in which nobody is heard, is always there.
+    pub modes: ModeTable,
+    /// The mode in which it begins. "idle" moves nothing before somebody asks for it.
+    #[param(default = "idle")]
+    pub start: Name,
+}
+
+fn whole(params: &ProcessParams, read: &Table) -> Vec<Mistake> {
+    let written = read.get("modes").and_then(|entry| entry.value.as_table());
+    let mut mistakes = written.map(ModeTable::mistakes).unwrap_or_default();
+    if let Some(entry) = read.get("start").filter(|_| params.modes.find(params.start.as_str()).is_none()) {
+        mistakes.push(Mistake::new(entry.at, no_mode(params, params.start.as_str())));
+    }
+    mistakes
+}
+
+fn no_mode(params: &ProcessParams, name: &str) -> String {
+    match nearest(name, params.modes.names()) {
+        Some(near) => format!("there is no mode \"{name}\"; did you mean \"{near}\"?"),
+        None => {
+            let all: Vec<&str> = params.modes.names().collect();
+            format!("there is no mode \"{name}\"; there are: {}", all.join(", "))
+        }
+    }
+}
+
+/// Changes the mode when it is asked to, when a task needs another, and when somebody whom the mode needs has died.
+#[derive(Agent)]
+#[agent(kind = "process-supervisor")]
+pub struct ProcessSupervisor {
+    /// Changes the mode by hand, as in sinew call processes.change name=idle.
+    change: Service<Mode, Answer>,
+    /// What is to be done, and in which mode.
+    tasks: Input<Task>,
+    /// Who there is, and who lives.
+    router: Router,
+    /// The mode, whenever it changes.
+    mode: Output<Mode>,
+    /// The task, after its mode.
+    task: Output<Task>,
+    /// Tasks that cannot be begun.
+    refused: Output<Report>,
+    params: ProcessParams,
+    /// The mode that was told last.
+    now: Option<Mode>,
+}
+
+impl Agent for ProcessSupervisor {
+    fn step(&mut self, _: &mut Step) -> Result<(), Fault> {
+        if self.now.is_none() {
+            self.enter(self.params.start);
+        }
+        while let Some((asked, call)) = self.change.take() {
+            let answer = self.asked(asked.name);
+            self.change.answer(&call, answer);
+        }
+        while let Some(task) = self.tasks.take().map(|received| *received) {
+            if self.why_not(task.mode).is_none() {
+                self.enter(task.mode);
+                self.task.send(task);
+                continue;
+            }
+            runtime::note!("a task is refused: its mode is not there, or an agent of it");
+            let refused = Report { task: task.number, progress: Progress::Refused, ..Report::default() };
+            self.refused.send(refused);
+        }
+        self.look_after();
+        Ok(())
+    }
+}
+
+impl ProcessSupervisor {
+    fn asked(&mut self, name: Name) -> Answer {
+        if let Some(why) = self.why_not(name) {
+            return Answer { why: why.as_str().into(), ..Answer::default() };
+        }
+        self.enter(name);
+        // A mode that is asked for by hand has no task: what was being done is over.
+        self.task.send(Task { mode: name, ..Task::default() });
+        Answer { accepted: true, task: 0, why: "the mode has changed".into() }
+    }
+
+    /// Why a mode cannot be entered.
+    fn why_not(&self, name: Name) -> Option<String> {
+        let Some(known) = self.params.modes.find(name.as_str()) else {
+            return Some(no_mode(&self.params, name.as_str()));
+        };
+        let system = self.router.system();
+        missing(&known.mode, &system)
+            .map(|agent| format!("the mode \"{name}\" needs \"{agent}\", which is not there or not alive"))
+    }
+
+    fn enter(&mut self, name: Name) {
+        let Some(known) = self.params.modes.find(name.as_str()) else { return };
+        let before = self.now.map_or(Name::EMPTY, |mode| mode.name);
+        if self.now.is_some() && before == name {
+            return;
+        }
+        let mode = Mode { before, ..known.mode };
+        self.now = Some(mode);
+        self.mode.send(mode);
+    }
+
+    /// Leaves a mode of which somebody has died.
+    fn look_after(&mut self) {
+        let Some(now) = self.now else { return };
+        let dead = missing(&now, &self.router.system());
+        if dead.is_none() {
+            return;
+        }
+        let Some(known) = self.params.modes.find(now.name.as_str()) else { return };
+        // What the table leads to may need the dead one, too: then the robot stands.
+        let next = match self.why_not(known.dies) {
+            None => known.dies,
+            Some(_) => Name::new(IDLE),
+        };
+        if next != now.name {
+            runtime::note!("somebody whom the mode needs has died: another mode");
+            self.enter(next);
+            self.task.send(Task { mode: next, ..Task::default() });
+        }
+    }
+}
+
+/// The first agent of a mode that is not there or not alive.
+fn missing(mode: &Mode, system: &Composition) -> Option<Name> {
+    let lives = |agent: &Name| {
+        system.member(agent.as_str()).is_some_and(|member| member.state() == AgentState::Running)
+    };
+    mode.rows.iter().map(|row| row.agent).find(|agent| !lives(agent))
+}

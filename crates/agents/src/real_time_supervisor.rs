@@ -1,0 +1,258 @@
+//! The real-time supervisor: the one door between the ordinary side, which plans and decides, and the real-time side, which drives.
+//!
+//! ```text
+//!   ordinary side                    real-time side
+//!   mode, task ───▶ together, once ──▶ mode ─▶ coordinator, actions
+//!                                      task ─▶ actions
+//!   status ◀─────── is it over? ◀───── reports of the actions
+//!                   is somebody silent? ─▶ idle, at once
+//! ```
+//!
+//! A task goes through when its mode is there, so no action ever works on a task in the mode of another. Whoever the mode names must be heard
+//! of again and again; who is not for too long makes the robot stand, without waiting for the ordinary side to notice. A task that is over
+//! makes it stand, too.
+
+use runtime::{Agent, Fault, Input, Output, Step};
+use types::messages::{MOST_AGENTS, Mode, Progress, Report, Task};
+use types::params::Params;
+use types::{AgentId, Duration, Name, Sequence, Time};
+
+use crate::process_supervisor::IDLE;
+
+/// How long somebody may be silent.
+#[derive(Clone, Debug, Params)]
+pub struct SupervisorParams {
+    /// An agent of the mode of which nothing is heard for so long is taken for dead (time). 250 ms is twelve steps of an action at 50 Hz, in which a robot at 0.6 m/s goes 15 cm.
+    #[param(default = Duration::millis(250), min = 0.01, max = 60.0)]
+    pub silence: Duration,
+}
+
+/// Passes modes and tasks to the real-time side, tells what becomes of them, and makes the robot stand when an action falls silent.
+#[derive(Agent)]
+#[agent(kind = "real-time-supervisor")]
+pub struct RealTimeSupervisor {
+    /// What the ordinary side wants to be in force.
+    mode: Input<Mode>,
+    /// What the ordinary side wants to be done.
+    task: Input<Task>,
+    /// What actions tell of their tasks; each tells something in every step.
+    reports: Input<Report>,
+    /// The mode in force, when it changes and once a second.
+    modes: Output<Mode>,
+    /// The task, when it changes and once a second.
+    tasks: Output<Task>,
+    /// What becomes of the task.
+    #[port(history = 64)]
+    status: Output<Report>,
+    params: SupervisorParams,
+    door: Door,
+    told: Option<Time>,
+}
+
+/// What stays the same is told again so often: an action that was started anew shall hear of it.
+const TELL_AGAIN: Duration = Duration::secs(1);
+
+impl Agent for RealTimeSupervisor {
+    fn step(&mut self, step: &mut Step) -> Result<(), Fault> {
+        let now = step.now;
+        while let Some(mode) = self.mode.take() {
+            self.door.wanted = Some(*mode);
+        }
+        while let Some(task) = self.task.take() {
+            self.door.waiting = Some(*task);
+        }
+        let mut changed = self.door.open(now);
+        let mut over = None;
+        while let Some(report) = self.reports.take() {
+            over = over.or(self.door.hear(report.header().sender, *report, now));
+        }
+        if let Some(progress) = over {
+            self.door.stand(progress);
+            changed = true;
+        }
+        if self.door.somebody_is_silent(&self.params, |name| step.agent_named(name), now) {
+            runtime::note!("an action of the mode is silent: standing");
+            self.door.stand(Progress::Halted);
+            changed = true;
+        }
+        if changed || self.told.is_none_or(|told| now - told >= TELL_AGAIN) {
+            self.told = Some(now);
+            self.modes.send(self.door.mode);
+            self.tasks.send(self.door.task);
+        }
+        self.status.send(self.door.status);
+        Ok(())
+    }
+}
+
+/// What is in force.
+#[derive(Clone, Copy, Debug)]
+struct Door {
+    mode: Mode,
+    task: Task,
+    status: Report,
+    /// What the ordinary side wanted last.
+    wanted: Option<Mode>,
+    /// A task whose mode is not in force yet.
+    waiting: Option<Task>,
+    /// When the mode came into force, and when each of its agents was heard last.
+    since: Time,
+    heard: Sequence<(AgentId, Time), MOST_AGENTS>,
+}
+
+impl Default for Door {
+    fn default() -> Door {
+        Door {
+            mode: Mode { name: IDLE.into(), ..Mode::default() },
+            task: Task::default(),
+            status: Report::default(),
+            wanted: None,
+            waiting: None,
+            since: Time::ZERO,
+            heard: Sequence::new(),
+        }
+    }
+}
+
+impl Door {
+    /// Puts into force what is wanted and complete; says whether anything changed.
+    fn open(&mut self, now: Time) -> bool {
+        let Some(task) = self.waiting else {
+            // Without a task only standing can be wanted by a mode alone, and people who drive by hand need no task either.
+            return false;
+        };
+        let mode = self.wanted.filter(|mode| mode.name == task.mode);
+        let Some(mode) = mode.or(Some(self.mode).filter(|mode| mode.name == task.mode)) else { return false };
+        self.waiting = None;
+        if mode.name != self.mode.name {
+            self.since = now;
+            self.heard = Sequence::new();
+        }
+        self.mode = Mode { before: self.mode.name, ..mode };
+        self.task = task;
+        let progress = if task.number == 0 { Progress::Idle } else { Progress::Underway };
+        self.status = Report { task: task.number, progress, ..Report::default() };
+        true
+    }
+
+    /// Takes over a report; gives how the task ended when it is over by it.
+    fn hear(&mut self, sender: AgentId, report: Report, now: Time) -> Option<Progress> {
+        match self.heard.iter_mut().find(|(known, _)| *known == sender) {
+            Some((_, at)) => *at = now,
+            // More than a mode can name have no say in it.
+            None => drop(self.heard.push((sender, now))),
+        }
+        if report.task != self.task.number || report.task == 0 || self.status.progress.is_over() {
+            return None;
+        }
+        // One that only watches tells of no way that is left; the one who drives does.
+        if report.progress != Progress::Idle {
+            self.status = report;
+        }
+        Some(report.progress).filter(|progress| progress.is_over())
+    }
+
+    /// Makes the robot stand; the status tells why.
+    fn stand(&mut self, why: Progress) {
+        self.status.progress = if self.task.number == 0 { Progress::Idle } else { why };
+        self.mode = Mode { name: IDLE.into(), before: self.mode.name, ..Mode::default() };
+        self.task = Task { number: self.task.number, mode: Name::new(IDLE), ..Task::default() };
+    }
+
+    /// Whether somebody whom the mode names was not heard of for too long.
+    fn somebody_is_silent(
+        &self,
+        params: &SupervisorParams,
+        find: impl Fn(&str) -> Option<AgentId>,
+        now: Time,
+    ) -> bool {
+        let last = |name: &Name| {
+            let id = find(name.as_str())?;
+            self.heard.iter().find(|(known, _)| *known == id).map(|(_, at)| *at)
+        };
+        self.mode.rows.iter().any(|row| {
+            // From its beginning an action has the same time as between two reports.
+            now - last(&row.agent).unwrap_or(self.since).max(self.since) > params.silence
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use types::messages::{ModeRow, Motion};
+
+    const GOTO: AgentId = AgentId(4);
+
+    fn at(millis: i64) -> Time {
+        Time::ZERO + Duration::millis(millis)
+    }
+
+    fn mode(name: &str) -> Mode {
+        let row = ModeRow { agent: "goto".into(), weight: 1.0, priority: 1 };
+        Mode { name: name.into(), rows: [row].into_iter().collect(), ..Mode::default() }
+    }
+
+    fn task(number: u32, mode: &str) -> Task {
+        Task { number, mode: mode.into(), motion: Motion::Goto, ..Task::default() }
+    }
+
+    fn find(name: &str) -> Option<AgentId> {
+        (name == "goto").then_some(GOTO)
+    }
+
+    fn underway() -> Door {
+        let mut door = Door { wanted: Some(mode("goto")), waiting: Some(task(1, "goto")), ..Door::default() };
+        assert!(door.open(at(0)));
+        door
+    }
+
+    #[test]
+    fn a_task_waits_for_its_mode_and_a_mode_for_its_task() {
+        let mut door = Door { waiting: Some(task(1, "goto")), ..Door::default() };
+        assert!(!door.open(at(0)), "its mode is not there");
+        door.wanted = Some(mode("move"));
+        assert!(!door.open(at(20)), "nor is it now");
+        door.wanted = Some(mode("goto"));
+        assert!(door.open(at(40)));
+        assert_eq!((door.mode.name.as_str(), door.task.number), ("goto", 1));
+        assert_eq!((door.status.task, door.status.progress), (1, Progress::Underway));
+        assert!(!door.open(at(60)), "once");
+        // The next task in the same mode needs no mode again.
+        (door.wanted, door.waiting) = (None, Some(task(2, "goto")));
+        assert!(door.open(at(80)));
+        assert_eq!(door.task.number, 2);
+    }
+
+    #[test]
+    fn what_is_over_makes_the_robot_stand_and_is_told_until_the_next_task() {
+        let mut door = underway();
+        let report = |progress| Report { task: 1, progress, distance: 0.004, ..Report::default() };
+        assert_eq!(door.hear(GOTO, report(Progress::Underway), at(20)), None);
+        assert_eq!(
+            door.hear(GOTO, Report { task: 7, ..report(Progress::Arrived) }, at(40)),
+            None,
+            "another's"
+        );
+        let over = door.hear(GOTO, report(Progress::Arrived), at(60)).unwrap();
+        door.stand(over);
+        assert_eq!((door.mode.name.as_str(), door.mode.rows.len()), (IDLE, 0));
+        assert_eq!((door.status.progress, door.status.distance), (Progress::Arrived, 0.004));
+        assert_eq!(door.hear(GOTO, report(Progress::Unreachable), at(80)), None, "it has ended already");
+        assert_eq!(door.status.progress, Progress::Arrived);
+    }
+
+    #[test]
+    fn who_is_silent_for_too_long_makes_the_robot_stand() {
+        let params = SupervisorParams::default();
+        let mut door = underway();
+        assert!(!door.somebody_is_silent(&params, find, at(250)));
+        assert!(door.somebody_is_silent(&params, find, at(251)), "it never spoke");
+        door.hear(GOTO, Report::default(), at(200));
+        assert!(!door.somebody_is_silent(&params, find, at(450)));
+        assert!(door.somebody_is_silent(&params, find, at(451)));
+        assert!(door.somebody_is_silent(&params, |_| None, at(451)), "it is not there at all");
+        door.stand(Progress::Halted);
+        assert!(!door.somebody_is_silent(&params, find, at(9000)), "nobody is needed to stand");
+    }
+}

@@ -1,0 +1,191 @@
+//! What the reactive layer is asked to do, and what becomes of it.
+
+use crate::geometry::Pose;
+use crate::message::{Field, Message};
+use crate::text::{Name, Text};
+
+/// A place to go to, as people and programs ask for it.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Message)]
+#[repr(C)]
+pub struct Goal {
+    /// (m)
+    pub x: f64,
+    /// (m)
+    pub y: f64,
+    /// The heading at the end (rad); it counts where `turned` says so.
+    pub heading: f64,
+    /// Whether the robot is to have the heading at the end.
+    pub turned: bool,
+    /// Whether to come to the pose to a centimetre, slowly at the end.
+    pub dock: bool,
+    /// The highest speed on the way (m/s); zero for the robot's own.
+    pub speed: f64,
+    /// How long it may take (s); zero for as long as the navigation module gives by itself.
+    pub seconds: f64,
+    /// The mode in which to go there; empty for the navigation module's choice.
+    pub mode: Name,
+}
+
+/// A motion without a place, as people and programs ask for it: a speed for a time, or a distance, or an angle.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Message)]
+#[repr(C)]
+pub struct Manoeuvre {
+    /// Speed (m/s): for a time, forward positive; on a distance, the highest, zero for the robot's own.
+    pub linear: f64,
+    /// Turn rate (rad/s): for a time, counter-clockwise positive; on an angle, the highest, zero for the robot's own.
+    pub angular: f64,
+    /// For how long to drive at these speeds (s); zero for a distance or an angle.
+    pub seconds: f64,
+    /// How far to drive straight on (m), backwards where negative.
+    pub distance: f64,
+    /// How far to turn on the spot (rad), counter-clockwise positive.
+    pub angle: f64,
+}
+
+/// A wish that the robot ends what it does, as people and programs ask for it.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Message)]
+#[repr(C)]
+pub struct Halt {
+    /// Why, for whoever reads the log.
+    pub why: Text<63>,
+}
+
+/// What becomes of a request.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Message)]
+#[repr(C)]
+pub struct Answer {
+    /// Whether it will be tried.
+    pub accepted: bool,
+    /// The number under which [`Report`] tells of it; zero where it is refused.
+    pub task: u32,
+    /// Why not; or what will be done.
+    pub why: Text<127>,
+}
+
+/// A kind of motion.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Field)]
+#[repr(u8)]
+pub enum Motion {
+    /// To stand still.
+    #[default]
+    Stand = 0,
+    /// To drive at a speed for a time.
+    Velocity = 1,
+    /// To drive straight on for a distance.
+    Distance = 2,
+    /// To turn on the spot.
+    Turn = 3,
+    /// To go to a place, straight or around what is in the way.
+    Goto = 4,
+    /// To go to a place along a planned path.
+    Path = 5,
+    /// To come to a pose to a centimetre.
+    Dock = 6,
+}
+
+/// What the robot does until the next task. Actions act on the newest.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Message)]
+#[repr(C)]
+pub struct Task {
+    /// Counts up; zero is none.
+    pub number: u32,
+    /// The mode in which it is done.
+    pub mode: Name,
+    /// What is done.
+    pub motion: Motion,
+    /// The frame of the target.
+    pub frame: Name,
+    /// Where to.
+    pub target: Pose,
+    /// Whether the heading of the target counts.
+    pub turned: bool,
+    /// Speed (m/s): what a velocity has, and what everything else has at most; zero for the action's own.
+    pub linear: f64,
+    /// Turn rate (rad/s): what a velocity has, and what everything else has at most; zero for the action's own.
+    pub angular: f64,
+    /// How far (m).
+    pub distance: f64,
+    /// How far to turn (rad).
+    pub angle: f64,
+    /// How long: what a velocity takes, and what everything else may take (s); zero for no end.
+    pub seconds: f64,
+}
+
+/// How far a task has come.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Field)]
+#[repr(u8)]
+pub enum Progress {
+    /// There is none.
+    #[default]
+    Idle = 0,
+    /// It is being done.
+    Underway = 1,
+    /// It is done: the robot is there.
+    Arrived = 2,
+    /// It took longer than it may.
+    TimedOut = 3,
+    /// There is no way, or the robot does not get on.
+    Unreachable = 4,
+    /// Somebody or something ended it before its time.
+    Halted = 5,
+    /// It cannot be done.
+    Refused = 6,
+    /// The robot does not know where it is.
+    Lost = 7,
+}
+
+impl Progress {
+    /// Whether nothing more will become of it.
+    pub const fn is_over(self) -> bool {
+        !matches!(self, Progress::Idle | Progress::Underway)
+    }
+
+    /// In a word.
+    pub const fn word(self) -> &'static str {
+        match self {
+            Progress::Idle => "idle",
+            Progress::Underway => "underway",
+            Progress::Arrived => "arrived",
+            Progress::TimedOut => "timed out",
+            Progress::Unreachable => "unreachable",
+            Progress::Halted => "halted",
+            Progress::Refused => "refused",
+            Progress::Lost => "lost",
+        }
+    }
+}
+
+/// What becomes of a task, from who does it.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Message)]
+#[repr(C)]
+pub struct Report {
+    /// The number of the task.
+    pub task: u32,
+    /// How far it has come.
+    pub progress: Progress,
+    /// What is left of the way, as the crow flies (m).
+    pub distance: f64,
+    /// What is left of the turn (rad).
+    pub angle: f64,
+    /// For how long it has been done (s).
+    pub seconds: f64,
+}
+
+impl crate::cdr::Field for Pose {
+    fn kind() -> crate::definition::Kind {
+        let entry = |name: &'static str| (name, crate::definition::Kind::F64);
+        let fields = [entry("x"), entry("y"), entry("theta")];
+        crate::definition::Kind::Struct(crate::definition::Definition::new(
+            "geometry_msgs/msg/Pose2D",
+            fields,
+        ))
+    }
+
+    fn write(&self, out: &mut crate::cdr::Writer) {
+        out.put(self.x).put(self.y).put(self.heading);
+    }
+
+    fn read(input: &mut crate::cdr::Reader<'_>) -> Result<Pose, crate::cdr::Error> {
+        Ok(Pose { x: input.get()?, y: input.get()?, heading: input.get()? })
+    }
+}
