@@ -35,7 +35,7 @@ use types::chance::Stream;
 
 use crate::floor::Distances;
 use crate::linear::{Matrix, diagonal};
-use crate::matching::{Geometry, MatchParams, NoMatch, Scan, match_scan};
+use crate::matching::{Geometry, MatchParams, NoMatch, Scan, match_carefully};
 use crate::monte_carlo::{Hypothesis, MOST_HYPOTHESES, MonteCarlo};
 use belief::Belief;
 use candidates::Candidates;
@@ -63,7 +63,7 @@ pub enum Outcome {
     Repeated,
     /// It is, to the last bit, the one before, though the robot has moved: the laser is stuck.
     Stuck,
-    /// Too little came back.
+    /// Too little came back: dead reckoning goes on.
     Empty,
     /// It does not fit where the robot should be.
     Misfit,
@@ -82,6 +82,10 @@ pub struct Localiser<F> {
     /// The digest of the last scan, and where the wheels said that it was first seen.
     last: Option<(u64, Pose)>,
     misses: u32,
+    /// Whether the last scan that was not a repetition fits.
+    is_fixed: bool,
+    /// Whether a scan has confirmed what somebody said.
+    is_confirmed: bool,
     inliers: f64,
     cloud: MonteCarlo,
     candidates: Candidates,
@@ -103,6 +107,8 @@ impl<F: Distances> Localiser<F> {
             scan: Scan::new(),
             last: None,
             misses: 0,
+            is_fixed: false,
+            is_confirmed: false,
             inliers: 0.0,
             cloud,
             candidates: Candidates::default(),
@@ -117,6 +123,7 @@ impl<F: Distances> Localiser<F> {
         self.belief =
             Belief { pose, covariance: diagonal([place * place, place * place, heading * heading]) };
         (self.state, self.misses) = (State::Tracking, 0);
+        (self.is_fixed, self.is_confirmed) = (false, false);
     }
 
     /// Nothing is known any more: the robot may be anywhere.
@@ -144,10 +151,12 @@ impl<F: Distances> Localiser<F> {
         }
         self.last = Some((digest, odometry));
         self.scan.take(ranges, geometry, self.params.beams);
-        match self.state {
+        let outcome = match self.state {
             State::Tracking => self.track(),
             State::Searching | State::Lost => self.look(moved),
-        }
+        };
+        self.is_fixed = outcome == Outcome::Fixed;
+        outcome
     }
 
     /// For a while no scan came. Dead reckoning goes on.
@@ -171,6 +180,11 @@ impl<F: Distances> Localiser<F> {
     /// Where the robot was at the last scan; nothing unless that is known.
     pub fn pose(&self) -> Option<Pose> {
         (self.state == State::Tracking).then_some(self.belief.pose)
+    }
+
+    /// Where the robot was at the last scan, if that scan itself fits: what others may be told.
+    pub fn fix(&self) -> Option<Pose> {
+        self.pose().filter(|_| self.is_fixed)
     }
 
     /// Where the robot is when its wheels say this, going on from the last scan; nothing unless that is known.
@@ -221,24 +235,25 @@ impl<F: Distances> Localiser<F> {
     fn track(&mut self) -> Outcome {
         let params = self.params.matching;
         let reach = self.belief.reach(&self.params);
-        let found = match_scan(&self.floor, &self.scan, self.belief.pose, &MatchParams { reach, ..params });
+        let found =
+            match_carefully(&self.floor, &self.scan, self.belief.pose, &MatchParams { reach, ..params });
         let found = match found {
             Ok(found) => found,
             Err(NoMatch::FewReturns) => return Outcome::Empty,
             Err(NoMatch::NothingNear) => return self.miss(Outcome::Misfit),
         };
         self.inliers = found.inliers;
-        if found.inliers < self.params.inliers_least
-            || !self.belief.correct(found.pose, &found.information, self.params.gate)
-        {
+        let least = if self.is_confirmed { self.params.inliers_least } else { self.params.inliers_sure };
+        if found.inliers < least || !self.belief.correct(found.pose, &found.information, self.params.gate) {
             return self.miss(Outcome::Misfit);
         }
-        self.misses = 0;
+        (self.misses, self.is_confirmed) = (0, true);
         Outcome::Fixed
     }
 
     fn miss(&mut self, outcome: Outcome) -> Outcome {
         self.misses += 1;
+        self.is_fixed = false;
         if self.misses >= self.params.misses {
             if outcome == Outcome::Stuck {
                 self.state = State::Lost;
@@ -287,7 +302,7 @@ impl<F: Distances> Localiser<F> {
             && let Some((pose, information)) = self.candidates.winner(&self.params)
         {
             self.belief = Belief::of(pose, &information);
-            self.state = State::Tracking;
+            (self.state, self.is_confirmed) = (State::Tracking, true);
             self.candidates.clear();
             return Outcome::Fixed;
         }

@@ -152,6 +152,35 @@ pub fn match_scan(
     })
 }
 
+/// From this share of points on, nothing better is looked for.
+const ENOUGH: f64 = 0.95;
+
+/// The same for a guess of which nobody knows whether it is off by millimetres or by the whole reach: first over a quarter of it, and where not
+/// nearly all points lie on the plan then, over all of it. Of both the one with more points on the plan is taken.
+///
+/// A wide reach alone can lead away from a guess that is right, where little is seen and much stands near to it.
+///
+/// # Errors
+/// As [`match_scan`].
+pub fn match_carefully(
+    floor: &impl Distances,
+    scan: &Scan,
+    guess: Pose,
+    params: &MatchParams,
+) -> Result<Match, NoMatch> {
+    let near = match_scan(floor, scan, guess, &MatchParams { reach: params.reach / 4.0, ..*params });
+    if let Ok(near) = near
+        && near.inliers >= ENOUGH
+    {
+        return Ok(near);
+    }
+    match (near, match_scan(floor, scan, guess, params)) {
+        (Ok(near), Ok(far)) if near.inliers >= far.inliers => Ok(near),
+        (Ok(near), Err(_)) => Ok(near),
+        (_, far) => far,
+    }
+}
+
 /// The share of the points of a scan that lie on something of the plan when it was taken at a pose, from 0 to 1.
 pub fn inliers(floor: &impl Distances, scan: &Scan, pose: Pose, within: f64) -> f64 {
     let near = |beam: &&Beam| {

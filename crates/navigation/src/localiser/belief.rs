@@ -66,7 +66,7 @@ impl Belief {
         // (P + R)⁻¹ = I − I (P⁻¹ + I)⁻¹ I, also where the measurement says nothing in some direction.
         let told = times(information, &off);
         let far = dot(&off, &told) - dot(&told, &times(&covariance, &told));
-        if !(far <= gate) {
+        if far > gate || far.is_nan() {
             return false;
         }
         let step = times(&product(&covariance, information), &off);

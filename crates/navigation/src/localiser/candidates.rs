@@ -6,7 +6,7 @@ use types::geometry::wrap;
 use super::{Fix, LocaliserParams};
 use crate::floor::Distances;
 use crate::linear::{Matrix, ZERO};
-use crate::matching::{Scan, match_scan};
+use crate::matching::{Scan, match_carefully};
 
 /// So many places are followed at most.
 pub const MOST_PLACES: usize = 8;
@@ -54,7 +54,7 @@ impl Place {
 
     /// Lays a scan over the floor from here. Gives whether it fits.
     fn fit(&mut self, floor: &impl Distances, scan: &Scan, params: &LocaliserParams) -> bool {
-        let found = match_scan(floor, scan, self.pose, &params.matching).ok();
+        let found = match_carefully(floor, scan, self.pose, &params.matching).ok();
         let found = found.filter(|found| found.inliers >= params.inliers_sure * 0.75);
         let Some(found) = found else { return false };
         let evidence = evidence(floor, scan, found.pose);

@@ -19,7 +19,7 @@ pub struct LocaliserParams {
     pub beams: usize,
     /// The share of points that must lie on the plan for a scan to fit while the robot is tracked. 0.4: a crowd may hide more than half.
     pub inliers_least: f64,
-    /// The same for a place that was searched for. 0.6: in a wrong place seldom more than half of the points lie on something.
+    /// The same for a place that was searched for, or that somebody said. 0.6: in a wrong place seldom more than half of the points lie on something.
     pub inliers_sure: f64,
     /// Squared deviations by which a scan may differ from what was expected. 25: the 0.99998 quantile of χ² of three numbers, as wheels err in the
     /// same way all the time.
