@@ -18,6 +18,7 @@
 //! | [`navigation`] | goals and manoeuvres of people and programs | tasks, and what becomes of them |
 //! | [`process_supervisor`] | tasks, who lives | the mode: who is heard, and how |
 //! | [`real_time_supervisor`] | modes, tasks, reports of actions | the same for the real-time side, together; standing when one is silent |
+//! | [`localizer`] | scans, odometry, a floor plan | where the robot is on the floor, or that it is not known |
 //! | [`coordinator`] | wishes, safety, decision, mode | one command for the drive |
 //! | [`decision_maker`] | safety, target, risk, battery, odometry, load, signals | situations, goal, everybody's weight and orders, reasons |
 //! | [`resource_manager`] | the load of the computer, orders | periods, methods, budgets and rest for all |
@@ -34,6 +35,7 @@ pub mod drive;
 pub mod head;
 pub mod image_tracker;
 pub mod laser;
+pub mod localizer;
 pub mod lookout;
 pub mod navigation;
 pub mod odometry;
@@ -55,6 +57,7 @@ pub use drive::DriveBase;
 pub use head::PanTilt;
 pub use image_tracker::ImageTracker;
 pub use laser::Laser;
+pub use localizer::Localizer;
 pub use lookout::Lookout;
 pub use navigation::Navigation;
 pub use odometry::DeadReckoning;
@@ -74,6 +77,7 @@ pub fn registry() -> runtime::Registry {
         Laser,
         Camera,
         DeadReckoning,
+        Localizer,
         Lookout,
         SafetyMonitor,
         WallFollower,
@@ -104,6 +108,7 @@ mod tests {
             "laser",
             "camera",
             "odometry",
+            "localizer",
             "lookout",
             "safety-monitor",
             "wall-follower",

@@ -3,6 +3,7 @@
 //! | to find | look in |
 //! |---|---|
 //! | what a world file says | [`plan`] |
+//! | what of a world a plan of the building shows | [`building`] |
 //! | what a robot is made of | [`model`] |
 //! | the running world | [`simulator`], with `robot` (motion, contacts) and `people` (scripts) |
 //! | sensors | `sonar`, [`laser`], [`camera`]; all are methods of [`Simulator`] |
@@ -14,6 +15,7 @@
 //! There is no clock, file, thread or generator here. The same plan, seed and commands give the same bytes.
 #![forbid(unsafe_code)]
 
+pub mod building;
 pub mod camera;
 pub mod colour;
 mod field;

@@ -19,6 +19,7 @@ mod agent;
 mod burden;
 mod compare;
 mod decide;
+mod floor;
 mod group;
 pub(crate) mod knowledge;
 mod library;
