@@ -23,6 +23,7 @@
 //! | [`tour`] | places | the wish to go there, one after another |
 //! | [`process_supervisor`] | tasks, who lives | the mode: who is heard, and how |
 //! | [`real_time_supervisor`] | modes, tasks, reports of actions | the same for the real-time side, together; standing when one is silent |
+//! | [`localizer`] | scans, odometry, a floor plan | where the robot is on the floor, or that it is not known |
 //! | [`coordinator`] | wishes, safety, decision, mode | one command for the drive |
 //! | [`decision_maker`] | safety, target, risk, battery, odometry, load, signals | situations, goal, everybody's weight and orders, reasons |
 //! | [`resource_manager`] | the load of the computer, orders | periods, methods, budgets and rest for all |
@@ -42,6 +43,7 @@ pub mod goto;
 pub mod head;
 pub mod image_tracker;
 pub mod laser;
+pub mod localizer;
 pub mod lookout;
 pub mod mover;
 pub mod navigation;
@@ -68,6 +70,7 @@ pub use goto::GotoAction;
 pub use head::PanTilt;
 pub use image_tracker::ImageTracker;
 pub use laser::Laser;
+pub use localizer::Localizer;
 pub use lookout::Lookout;
 pub use mover::MoveAction;
 pub use navigation::Navigation;
@@ -90,6 +93,7 @@ pub fn registry() -> runtime::Registry {
         Laser,
         Camera,
         DeadReckoning,
+        Localizer,
         Lookout,
         SafetyMonitor,
         WallFollower,
@@ -125,6 +129,7 @@ mod tests {
             "laser",
             "camera",
             "odometry",
+            "localizer",
             "lookout",
             "safety-monitor",
             "wall-follower",

@@ -8,16 +8,29 @@
 //! | [`ground`] | where it is free, where something stands, where the robot has been | the way to the nearest new ground |
 //! | [`path`] | a grid, a start and a goal | the shortest way, or one at once and then better ones; smoothed, with a time table |
 //! | [`calibration`] | measurements of the robot itself | its wheels, and distances by sizes in the picture |
-//! | [`localisation`] | steps of the wheels, sightings of landmarks and robots, scans on a known map | where the robot is, was and will be |
+//! | [`localisation`] | steps of the wheels, sightings of landmarks and robots | where the robot is, was and will be |
 //! | [`mapping`] | poses and scans | a map of what stands where |
+//! | [`floor`] | a plan of walls, or a grid | how far any point is from them, exactly |
+//! | [`matching`] | a scan, a floor, and about where | where the scan was taken, and how sure that is |
+//! | [`drift`] | a motion by the wheels | how far it may be off |
+//! | [`monte_carlo`] | motions and scans | the places where the robot may be, from none known |
+//! | [`localiser`] | what the wheels say, and scans | where the robot is on a known floor, or that it is not known |
 //! | [`roam`] | what is around, and the ground | a motion along the walls, through every gap, to where the robot has not been |
 #![forbid(unsafe_code)]
 
 pub mod calibration;
+pub mod drift;
+pub mod floor;
 pub mod ground;
+#[cfg(test)]
+mod laboratory;
 mod layer;
+mod linear;
 pub mod localisation;
+pub mod localiser;
 pub mod mapping;
+pub mod matching;
+pub mod monte_carlo;
 pub mod path;
 pub mod roam;
 mod search;

@@ -260,6 +260,8 @@ fn parameter(field: &ParamField) -> Json {
         Value::List(_) => json!({"type": "array"}),
         // The name of a pattern in the store stands for its table.
         Value::Table(_) if field.name == "pattern" => json!({"type": ["object", "string"]}),
+        // "world", or the name of a file.
+        Value::Table(_) if field.name == "floor" => json!({"type": ["object", "string"]}),
         Value::Table(_) => json!({"type": "object"}),
         Value::Text(_) if field.kind.starts_with("a time") => json!({"$ref": "#/$defs/time"}),
         Value::Text(_) => json!({"type": "string"}),

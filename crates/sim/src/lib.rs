@@ -3,6 +3,7 @@
 //! | to find | look in |
 //! |---|---|
 //! | what a world file says | [`plan`] |
+//! | what of a world a plan of the building shows | [`building`] |
 //! | what a robot is made of | [`model`] |
 //! | the running world | [`simulator`], with `robot` (motion, contacts), `people` (scripts) and `crowd` |
 //! | what a hand does to it meanwhile | [`hand`] |
@@ -15,6 +16,7 @@
 //! There is no clock, file, thread or generator here. The same plan, seed and commands give the same bytes.
 #![forbid(unsafe_code)]
 
+pub mod building;
 pub mod camera;
 pub mod colour;
 mod crowd;

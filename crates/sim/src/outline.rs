@@ -9,9 +9,9 @@ use crate::plan::{Cuboid, Wall, WorldPlan};
 use crate::shape::{self, Circle, Segment};
 
 /// Radius of a table's leg (m).
-const LEG: f64 = 0.025;
+pub(crate) const LEG: f64 = 0.025;
 /// Thickness of the board of a table with legs (m).
-const BOARD: f64 = 0.04;
+pub(crate) const BOARD: f64 = 0.04;
 /// A door belongs to a wall whose middle line passes at most this far from it (m).
 const ON_WALL: f64 = 0.05;
 
@@ -88,29 +88,17 @@ impl Raised {
 
     fn wall(&mut self, plan: &WorldPlan, wall: &Wall) {
         let look = Look { colour: wall.colour, top: wall.colour, body: 0, skirting: true };
-        let closed = wall.line.len() > 2 && wall.line.first() == wall.line.last();
-        let pieces = wall.line.len() - 1;
-        for (k, pair) in wall.line.windows(2).enumerate() {
-            let segment = Segment::new(pair[0], pair[1]);
-            let length = segment.along.norm();
-            for (from, to) in solid_parts(plan, &segment) {
-                // At a corner the pieces of a thick wall overlap, so that it has no notch; at a door they end clean.
-                let before = from == 0.0 && (k > 0 || closed);
-                let after = to == 1.0 && (k + 1 < pieces || closed);
-                let extra = wall.thickness / 2.0 / length;
-                let a = segment.a + segment.along * (from - if before { extra } else { 0.0 });
-                let b = segment.a + segment.along * (to + if after { extra } else { 0.0 });
-                if wall.thickness > 0.0 {
-                    self.bodies += 1;
-                    let look = self.look(Look { body: self.bodies, ..look });
-                    let out = segment.normal * (wall.thickness / 2.0);
-                    self.outline(&[a + out, b + out, b - out, a - out], 0.0, wall.height, look);
-                } else {
-                    let look = self.look(look);
-                    self.faces.push(Face { segment: Segment::new(a, b), low: 0.0, high: wall.height, look });
-                    self.edges.push((a, 0.0, wall.height));
-                    self.edges.push((b, 0.0, wall.height));
-                }
+        for (a, b) in pieces(plan, wall) {
+            if wall.thickness > 0.0 {
+                self.bodies += 1;
+                let look = self.look(Look { body: self.bodies, ..look });
+                let out = Segment::new(a, b).normal * (wall.thickness / 2.0);
+                self.outline(&[a + out, b + out, b - out, a - out], 0.0, wall.height, look);
+            } else {
+                let look = self.look(look);
+                self.faces.push(Face { segment: Segment::new(a, b), low: 0.0, high: wall.height, look });
+                self.edges.push((a, 0.0, wall.height));
+                self.edges.push((b, 0.0, wall.height));
             }
         }
     }
@@ -130,6 +118,26 @@ impl Raised {
             }
         }
     }
+}
+
+/// The straight pieces of a wall that no open door takes away, from where to where its middle line goes. At a corner the pieces of a thick wall
+/// overlap, so that it has no notch; at a door they end clean.
+pub(crate) fn pieces(plan: &WorldPlan, wall: &Wall) -> Vec<(Point, Point)> {
+    let closed = wall.line.len() > 2 && wall.line.first() == wall.line.last();
+    let lines = wall.line.len().saturating_sub(1);
+    let mut pieces = Vec::new();
+    for (k, pair) in wall.line.windows(2).enumerate() {
+        let segment = Segment::new(pair[0], pair[1]);
+        let extra = wall.thickness / 2.0 / segment.along.norm();
+        for (from, to) in solid_parts(plan, &segment) {
+            let before = from == 0.0 && (k > 0 || closed);
+            let after = to == 1.0 && (k + 1 < lines || closed);
+            let a = segment.a + segment.along * (from - if before { extra } else { 0.0 });
+            let b = segment.a + segment.along * (to + if after { extra } else { 0.0 });
+            pieces.push((a, b));
+        }
+    }
+    pieces
 }
 
 /// The parts of a wall's piece that no open door takes away, as fractions of its length.

@@ -3,4 +3,5 @@
 #![allow(clippy::unwrap_used)] // a test may
 
 mod deciding;
+mod localizing;
 mod seeing;

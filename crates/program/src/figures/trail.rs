@@ -322,7 +322,7 @@ impl Trail {
         let has_place = matches!(task.motion, Motion::Goto | Motion::Path | Motion::Dock);
         let mut robots = self.robots.values().filter_map(|seen| seen.way.last());
         let (Some((_, pose)), None) = (robots.next(), robots.next()) else { return None };
-        let is_true = has_place && task.frame.as_str() == "map";
+        let is_true = has_place && task.frame.as_str() == agents::localizer::MAP;
         is_true.then(|| pose.position().distance(task.target.position()))
     }
 

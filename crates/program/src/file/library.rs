@@ -17,6 +17,8 @@ pub enum Shelf {
     Scenarios,
     /// Worlds.
     Worlds,
+    /// Floors; none is built in.
+    Floors,
 }
 
 /// A text that was found.
@@ -36,6 +38,7 @@ impl Shelf {
         match self {
             Shelf::Scenarios => built_in::SCENARIOS,
             Shelf::Worlds => built_in::WORLDS,
+            Shelf::Floors => &[],
         }
     }
 
@@ -48,6 +51,7 @@ impl Shelf {
         match self {
             Shelf::Scenarios => "system file or scenario",
             Shelf::Worlds => "world",
+            Shelf::Floors => "floor",
         }
     }
 
@@ -97,6 +101,9 @@ impl Shelf {
         let said = mistake(format!("there is no {} \"{name}\"", self.kind()));
         match nearest(name, self.names()) {
             Some(near) => said.help(format!("did you mean \"{near}\"?")),
+            None if self.built_in().is_empty() => {
+                said.help("it can be \"world\", for that of the simulated world, or the path of a file, as in \"office.toml\"")
+            }
             None => {
                 let names: Vec<&str> = self.names().collect();
                 said.help(format!("built in are: {}; anything else is the path of a file", names.join(", ")))

@@ -21,6 +21,7 @@ pub(crate) mod calls;
 mod compare;
 mod decide;
 mod figure;
+mod floor;
 mod group;
 pub(crate) mod knowledge;
 mod library;

@@ -16,7 +16,7 @@ use super::group::Names;
 use super::library::Shelf;
 use super::sources::{Mistakes, Sources};
 use super::wires::Written;
-use super::{burden, compare, decide, figure, knowledge, modes, set, tree};
+use super::{burden, compare, decide, figure, floor, knowledge, modes, set, tree};
 
 /// The sections of a system file.
 pub(crate) const SECTIONS: [&str; 17] = [
@@ -43,7 +43,7 @@ const LONGEST: Duration = Duration::secs(10 * 365 * 24 * 3600);
 /// The agent type that a robot is.
 pub(super) const ROBOT: &str = "robot";
 /// The entries of a robot that are not its model's.
-const OF_ROBOT: [&str; 2] = ["driver", "start"];
+pub(super) const OF_ROBOT: [&str; 2] = ["driver", "start"];
 
 /// A system file that was read, with what belongs to it.
 #[derive(Clone, Debug)]
@@ -139,8 +139,8 @@ pub(super) struct Reader<'r> {
     pub(super) pending: Vec<Pending>,
     pub(super) written: Vec<Written>,
     pub(super) names: Names,
-    folder: PathBuf,
-    world: Option<Table>,
+    pub(super) folder: PathBuf,
+    pub(super) world: Option<Table>,
 }
 
 /// `word` is none of `known`, said in words of one's own.
@@ -214,6 +214,7 @@ impl<'r> Reader<'r> {
         figure::read(self, tree);
         knowledge::read(self, tree);
         self.read_world(tree);
+        floor::read(self);
         let judged = runtime::check(&self.plan, self.registry);
         let spoiled = &self.spoiled;
         self.mistakes.extend(judged.into_iter().filter(|mistake| !spoiled.contains(&mistake.at)));

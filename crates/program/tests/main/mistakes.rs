@@ -9,7 +9,7 @@ use program::{Failure, Paint, file};
 use crate::registry;
 
 /// Files that are parts of others.
-const PARTS: [&str; 2] = ["part", "own_name"];
+const PARTS: [&str; 3] = ["part", "own_name", "floor_part"];
 
 #[test]
 fn wrong_files_are_told_what_is_wrong() {
