@@ -47,10 +47,14 @@ pub struct RealTimeSupervisor {
     params: SupervisorParams,
     door: Door,
     told: Option<Time>,
+    said: Option<(Report, Time)>,
 }
 
 /// What stays the same is told again so often: an action that was started anew shall hear of it.
 const TELL_AGAIN: Duration = Duration::secs(1);
+
+/// The ordinary side hears so often how far a task has come, and at once when it is over.
+const STATUS_EVERY: Duration = Duration::millis(100);
 
 impl Agent for RealTimeSupervisor {
     fn step(&mut self, step: &mut Step) -> Result<(), Fault> {
@@ -80,7 +84,14 @@ impl Agent for RealTimeSupervisor {
             self.modes.send(self.door.mode);
             self.tasks.send(self.door.task);
         }
-        self.status.send(self.door.status);
+        let status = self.door.status;
+        let is_news = |(told, at): (Report, Time)| {
+            (told.task, told.progress) != (status.task, status.progress) || now - at >= STATUS_EVERY
+        };
+        if self.said.is_none_or(is_news) {
+            self.said = Some((status, now));
+            self.status.send(status);
+        }
         Ok(())
     }
 }
