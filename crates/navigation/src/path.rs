@@ -13,7 +13,8 @@
 //! | [`AStar`] | comparison | the shortest way |
 //! | [`Dijkstra`] | many goals at once | the shortest ways to all cells |
 //!
-//! All have one face, [`Planner`]; those that have a way before they are done also [`Anytime`].
+//! All have one face, [`Planner`]; those that have a way before they are done also [`Anytime`]. A [`Smoother`] pulls the way straight, and a [`TimeTable`] says when to
+//! be where on it.
 
 mod a_star;
 mod ara;
@@ -29,6 +30,8 @@ mod jump;
 pub mod moving_ai;
 mod nodes;
 mod planner;
+mod smooth;
+mod timing;
 mod way;
 
 pub use a_star::AStar;
@@ -39,6 +42,8 @@ pub use field::Field;
 pub use grid::{Cell, Grid, LARGEST};
 pub use jump::Jump;
 pub use planner::{Anytime, NoPath, Planner, Refined};
+pub use smooth::{Smoother, is_clear, length};
+pub use timing::{DriveLimits, Moment, TimeTable};
 pub use way::Path;
 
 #[cfg(test)]

@@ -45,7 +45,7 @@ fn walked(grid: &Grid, path: &Path, start: Cell, goal: Cell) -> f64 {
 }
 
 /// Blots on a floor, up to a maze; a start and a goal.
-fn floors() -> impl Strategy<Value = (Grid, Cell, Cell)> {
+pub(super) fn floors() -> impl Strategy<Value = (Grid, Cell, Cell)> {
     let size = (1u32..48, 1u32..40);
     (size, 0.0..2.5f64, 0.0..0.45f64).prop_flat_map(|((width, height), radius, density)| {
         let cells = (width * height) as usize;
