@@ -38,7 +38,7 @@ pub struct Periods {
     pub head: Option<Duration>,
     /// Poses that came with a recording.
     pub pose: Option<Duration>,
-    /// What sees or hears landmarks; where there is both, the more frequent.
+    /// What sees or hears landmarks; where there is both, the mean time between readings of either.
     pub landmarks: Option<Duration>,
 }
 

@@ -104,10 +104,7 @@ pub fn describe(model: &Model) -> RobotDescription {
         battery: Some(model.battery.period),
         head: Some(model.head.period),
         pose: None,
-        landmarks: [model.landmarks.map(|it| it.period), model.infrared.map(|it| it.period)]
-            .into_iter()
-            .flatten()
-            .min(),
+        landmarks: both(model.landmarks.map(|it| it.period), model.infrared.map(|it| it.period)),
     };
     if let Some(laser) = &model.laser {
         description.mount(LASER, laser.mount(), laser.height);
@@ -125,6 +122,16 @@ pub fn describe(model: &Model) -> RobotDescription {
     description.head = Some(HeadLimits { pan_max: model.head.max_pan, tilt_max: model.head.max_tilt });
     description.watchdog = Duration::from_seconds(model.drive.watchdog);
     description
+}
+
+/// The mean time between two readings of either of two sensors.
+fn both(one: Option<Duration>, other: Option<Duration>) -> Option<Duration> {
+    match (one, other) {
+        (Some(one), Some(other)) => {
+            Some(Duration::from_seconds(1.0 / (1.0 / one.seconds() + 1.0 / other.seconds())))
+        }
+        (one, other) => one.or(other),
+    }
 }
 
 /// What the motors can do. There is no ramp: the wheels follow with a lag of their own, and a ramp in the gate would delay a stop.
