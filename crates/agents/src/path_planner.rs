@@ -165,11 +165,19 @@ struct Plan {
     corner: (i32, i32),
     /// Whether the goal lies beyond the grid.
     beyond: bool,
+    /// Where to, where there is room for the robot: the path ends there, and not in the middle of a cell.
+    end: Option<Point>,
 }
 
 impl Default for Plan {
     fn default() -> Plan {
-        Plan { grid: Grid::new(SIDE, SIDE), field: Field::new(SIDE, SIDE), corner: (0, 0), beyond: false }
+        Plan {
+            grid: Grid::new(SIDE, SIDE),
+            field: Field::new(SIDE, SIDE),
+            corner: (0, 0),
+            beyond: false,
+            end: None,
+        }
     }
 }
 
@@ -185,7 +193,9 @@ impl Plan {
         let start = fit(self.cell(here), &self.grid);
         let cell = self.cell(goal);
         self.beyond = self.middle(cell).distance(goal) > CELL;
-        let goal = fit(cell, &self.grid);
+        let fitted = fit(cell, &self.grid);
+        self.end = (fitted == cell && !self.beyond).then_some(goal);
+        let goal = fitted;
         // Why there is none stands in the path: it has no points.
         let _ = self.field.begin(&self.grid, start, goal);
     }
@@ -225,6 +235,9 @@ impl Plan {
         };
         for corner in best.corners() {
             path.cut |= path.points.push(self.middle(corner).into()).is_err();
+        }
+        if let (Some(end), Some(last), false) = (self.end, path.points.last_mut(), path.cut) {
+            *last = end.into();
         }
         path
     }
@@ -283,7 +296,11 @@ mod tests {
         assert!(path.found && !path.cut && path.quality == 1.0);
         assert!((path.length - 3.0).abs() < 1e-9, "{}", path.length);
         assert_eq!(path.points.len(), 2);
-        assert!((path.points[1].x - 3.05).abs() < 1e-9 && (path.points[1].y - 0.05).abs() < 1e-9);
+        assert_eq!(
+            (path.points[1].x, path.points[1].y),
+            (3.0, 0.0),
+            "to the place itself, not to the middle of its cell"
+        );
     }
 
     #[test]

@@ -9,17 +9,13 @@
 //! | [`filter`] | steps of the wheels | a pose, how uncertain it is, and the lasting errors of the wheels |
 //! | [`sighting`] | range and bearing of something, or from another robot | the filter set right |
 //! | [`association`] | a sighting of one does not know what | which landmark it is, if that can be told |
-//! | [`likelihood`] | a map of walls | how well the end of a beam suits it |
 //! | [`localizer`] | steps and sightings in any order of time | the pose at any time of the last seconds, and a little ahead |
-//! | [`monte_carlo`] | steps and scans on a known map | the pose from an unknown start, also after the robot was carried away |
 //!
 //! A gyro comes in before: [`motion::heading`] fuses it with the wheels, learns its bias, and what it gives is a step of the wheels for the filter.
 
 pub mod association;
 pub mod filter;
-pub mod likelihood;
 pub mod localizer;
-pub mod monte_carlo;
 pub mod sighting;
 
 pub use filter::{Errors, Filter, Parameters};

@@ -38,20 +38,25 @@ pub(crate) fn in_bytes(words: &[String], plan: &Plan, registry: &Registry) -> Re
     Ok(head.into_iter().chain(within.into_iter().cloned()).collect())
 }
 
-/// Makes the requests of a plan, and others, ready to be asked. What cannot be is left as it is: the runtime refuses it in its time.
+/// Makes the requests of a plan, and others, ready to be asked; gives each that has changed as it is asked and as it was said. What cannot be
+/// made ready is left as it is: the runtime refuses it in its time.
 pub(crate) fn ready<'w>(
     plan: &mut Plan,
     others: impl Iterator<Item = &'w mut Vec<String>>,
     registry: &Registry,
-) {
-    let whole = plan.clone();
-    let make_ready = |words: &mut Vec<String>| {
-        if let Ok(bytes) = in_bytes(words, &whole, registry) {
+) -> Vec<(String, String)> {
+    let (whole, mut said) = (plan.clone(), Vec::new());
+    let mut make_ready = |words: &mut Vec<String>| {
+        if let Ok(bytes) = in_bytes(words, &whole, registry).map_err(drop)
+            && bytes != *words
+        {
+            said.push((bytes.join(" "), words.join(" ")));
             *words = bytes;
         }
     };
     plan.requests.iter_mut().for_each(|request| make_ready(&mut request.words));
     others.for_each(make_ready);
+    said
 }
 
 fn read(fields: &[&String]) -> Result<Table, Refusal> {
@@ -148,7 +153,8 @@ mod tests {
         file.plan.requests =
             vec![runtime::TimedRequest { at, words: words(asked), place: Default::default() }];
         let mut ready = Scenario { file, registry }.prepare(1).unwrap();
-        super::ready(&mut ready.plan, std::iter::empty(), &ready.registry);
+        let said = super::ready(&mut ready.plan, std::iter::empty(), &ready.registry);
+        assert!(said.iter().all(|(bytes, words)| bytes.contains(" cdr=") && !words.contains(" cdr=")));
         let (facts, seen) = (Facts::default(), record::log::RunInfo::default());
         let (log, _) = LogFile::create(&path, &seen, 1.0, facts.clone(), Asked::default()).unwrap();
         let options = runtime::Options {

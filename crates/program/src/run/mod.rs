@@ -179,7 +179,7 @@ impl One<'_> {
         let mut plan = ready.plan.clone();
         let mut firings = self.knowing.map(|knowing| knowing.firings(self.clock, self.limit(&ready)));
         let scheduled = firings.iter_mut().flatten().map(|firing| &mut firing.words);
-        file::calls::ready(&mut plan, scheduled, &ready.registry);
+        let said = file::calls::ready(&mut plan, scheduled, &ready.registry);
         let asked = Asked::of(&mut plan, firings.unwrap_or_default(), self.repeat.as_ref());
         let log = self.log(&ready, &asked)?;
         let facts = log.as_ref().map(|(_, facts, _)| facts.clone());
@@ -210,6 +210,11 @@ impl One<'_> {
         };
         let report = self.play(&ready, &plan, &asked, options)?;
         let mut summary = Summary::new(&ready, self.seed, clock_name(self.clock), report);
+        for incident in &mut summary.incidents {
+            if let Some((bytes, words)) = said.iter().find(|(bytes, _)| incident.what.contains(bytes)) {
+                incident.what = incident.what.replace(bytes, words);
+            }
+        }
         summary.done = useful::done(&ready, &summary.agents, summary.time);
         summary.images = self.args.images;
         summary.log = outcome.map(|outcome| outcome.lock().unwrap_or_else(PoisonError::into_inner).clone());
