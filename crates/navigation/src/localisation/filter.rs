@@ -276,20 +276,31 @@ mod tests {
     fn covariance_grows_as_differences_of_paths_say() {
         let parameters = exact();
         let steps: Vec<(f64, f64)> = (0..80).map(|i| (0.02, 0.03 * libm::sin(f64::from(i) * 0.1))).collect();
-        let mut filter = Filter::new(&parameters, Pose::default(), [[0.0; 3]; 3]);
+        let spread = [[0.01, 0.0, 0.0], [0.0, 0.01, 0.0], [0.0, 0.0, 0.01]];
+        let mut filter = Filter::new(&parameters, Pose::default(), spread);
+        // Errors that go together, so that the sign of each gradient counts.
+        for (k, l) in [(3, 6), (3, 4), (4, 5), (2, 5), (0, 3)] {
+            let together = 0.5 * (filter.covariance[(k, k)] * filter.covariance[(l, l)]).sqrt();
+            filter.covariance[(k, l)] = together;
+            filter.covariance[(l, k)] = together;
+        }
         let before = filter.covariance;
         for (distance, turn) in &steps {
             filter.predict(&parameters, Increment { distance: *distance, turn: *turn }, 0.1);
         }
+        let by: Vec<[f64; 3]> = (0..STATES)
+            .map(|k| {
+                let mut off = Vector::zeros();
+                off[k] = 1e-5;
+                let (more, less) = (end(&parameters, off, &steps), end(&parameters, -off, &steps));
+                core::array::from_fn(|i| (more[i] - less[i]) / 2e-5)
+            })
+            .collect();
         let mut wanted = [[0.0; 3]; 3];
-        for k in 0..STATES {
-            let mut off = Vector::zeros();
-            off[k] = 1e-5;
-            let (more, less) = (end(&parameters, off, &steps), end(&parameters, -off, &steps));
-            let by: [f64; 3] = core::array::from_fn(|i| (more[i] - less[i]) / 2e-5);
+        for (k, l) in (0..STATES).flat_map(|k| (0..STATES).map(move |l| (k, l))) {
             for i in 0..3 {
                 for j in 0..3 {
-                    wanted[i][j] += by[i] * by[j] * before[(k, k)];
+                    wanted[i][j] += by[k][i] * before[(k, l)] * by[l][j];
                 }
             }
         }

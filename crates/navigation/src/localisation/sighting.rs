@@ -209,3 +209,106 @@ pub fn seen_from(pose: Pose, point: Point) -> Sighting {
     let (dx, dy) = (point.x - pose.x, point.y - pose.y);
     Sighting { range: hypot(dx, dy), bearing: atan2(c * dy - s * dx, c * dx + s * dy) }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::super::filter::{Errors, Vector};
+    use super::*;
+    use proptest::prelude::*;
+
+    /// What is expected less what is seen changes with the state, and with where the other end is, as the gradients say.
+    fn check(state: Vector, other: Pose, is_seen: bool) -> Result<(), TestCaseError> {
+        let seen = Sighting { range: 2.0, bearing: 0.3 };
+        let filter = |state: Vector| Filter { state, covariance: Covariance::identity() };
+        let Some(expected) = filter(state).geometry(seen, other, is_seen) else { return Ok(()) };
+        let close = |more: SVector<f64, 2>, less: SVector<f64, 2>, want: [f64; 2]| {
+            let by = [(less[0] - more[0]) / 2e-6, wrap(less[1] - more[1]) / 2e-6];
+            (by[0] - want[0]).abs() < 1e-5 && (by[1] - want[1]).abs() < 1e-5 * (1.0 + want[1].abs())
+        };
+        for k in 0..STATES {
+            let mut off = Vector::zeros();
+            off[k] = 1e-6;
+            let at = |state| filter(state).geometry(seen, other, is_seen).unwrap().innovation;
+            let want = [expected.gradient[(0, k)], expected.gradient[(1, k)]];
+            prop_assert!(close(at(state + off), at(state - off), want), "state {k}");
+        }
+        for k in 0..3 {
+            let moved = |by: f64| {
+                let [dx, dy, dh] = [0, 1, 2].map(|axis| if axis == k { by } else { 0.0 });
+                let other = Pose::new(other.x + dx, other.y + dy, other.heading + dh);
+                filter(state).geometry(seen, other, is_seen).unwrap().innovation
+            };
+            let want = [expected.by_other[(0, k)], expected.by_other[(1, k)]];
+            // A point has no direction, and what is seen needs none.
+            prop_assert!(close(moved(1e-6), moved(-1e-6), want), "other {k}");
+        }
+        Ok(())
+    }
+
+    proptest! {
+        #[test]
+        fn gradients_are_what_small_changes_do(
+            x in -3.0..3.0f64, y in -3.0..3.0f64, heading in -3.0..3.0f64, error in -0.2..0.2f64,
+            u in -3.0..3.0f64, v in -3.0..3.0f64, direction in -3.0..3.0f64, is_seen in any::<bool>()
+        ) {
+            prop_assume!(hypot(u - x, v - y) > 0.2);
+            let mut state = Vector::zeros();
+            (state[0], state[1], state[2], state[7]) = (x, y, heading, error);
+            check(state, Pose::new(u, v, direction), is_seen)?;
+        }
+
+        #[test]
+        fn who_sees_and_who_is_seen_agree_where_both_are(
+            x in -3.0..3.0f64, y in -3.0..3.0f64, heading in -3.0..3.0f64, u in -3.0..3.0f64, v in -3.0..3.0f64, error in -0.1..0.1f64
+        ) {
+            prop_assume!(hypot(u - x, v - y) > 0.3);
+            let parameters = Parameters { usual: Errors::default(), ..Parameters::default() };
+            let small = [[1e-6, 0.0, 0.0], [0.0, 1e-6, 0.0], [0.0, 0.0, 1e-6]];
+            let large = [[0.04, 0.0, 0.0], [0.0, 0.04, 0.0], [0.0, 0.0, 0.04]];
+            let (here, there) = (Pose::new(x, y, heading), Pose::new(u, v, 1.0));
+            let exact = seen_from(here, there.position());
+            let seen = Sighting { bearing: wrap(exact.bearing + error), ..exact };
+            let knows = Filter::new(&parameters, here, small).with_errors(Errors { bearing: error, ..Errors::default() });
+            // Who is seen was wrong by some centimetres, and is set right by what the other tells.
+            let mut lost = Filter::new(&parameters, Pose::new(u + 0.1, v - 0.1, 1.0), large);
+            let before = lost.pose().position().distance(there.position());
+            for _ in 0..40 {
+                lost.correct(&parameters, &Sight::FromRobot(seen, knows.view()));
+            }
+            prop_assert!(lost.pose().position().distance(there.position()) < 0.2 * before, "{:?}", lost.pose());
+        }
+    }
+
+    #[test]
+    fn what_others_are_told_of_the_direction_takes_in_the_camera() {
+        let parameters = Parameters::default();
+        let spread = [[0.01, 0.0, 0.0], [0.0, 0.02, 0.0], [0.0, 0.0, 0.03]];
+        let filter = Filter::new(&parameters, Pose::new(1.0, 2.0, 0.5), spread)
+            .with_errors(Errors { bearing: 0.1, ..Errors::default() });
+        let view = filter.view();
+        assert!((view.pose.heading - 0.4).abs() < 1e-12);
+        // Independent, so their variances add.
+        let usual = parameters.usual.bearing;
+        assert!((view.spread[2][2] - (0.03 + usual * usual)).abs() < 1e-12, "{:?}", view.spread);
+        assert_eq!((view.spread[0][0], view.spread[1][1]), (0.01, 0.02));
+    }
+
+    #[test]
+    fn what_is_no_number_or_too_near_is_not_used() {
+        let parameters = Parameters::default();
+        let mut filter =
+            Filter::new(&parameters, Pose::default(), [[0.1, 0.0, 0.0], [0.0, 0.1, 0.0], [0.0, 0.0, 0.1]]);
+        let before = filter;
+        for (range, bearing, at) in [
+            (f64::NAN, 0.0, Point::new(1.0, 0.0)),
+            (1.0, f64::INFINITY, Point::new(1.0, 0.0)),
+            (1.0, 0.0, Point::new(0.01, 0.0)),
+            (1.0, 0.0, Point::new(f64::NAN, 0.0)),
+        ] {
+            assert!(
+                !filter.correct(&parameters, &Sight::Of(Sighting { range, bearing }, at, [[0.0; 2]; 2])).used
+            );
+        }
+        assert_eq!(filter, before);
+    }
+}

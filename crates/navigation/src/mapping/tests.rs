@@ -131,6 +131,23 @@ fn who_walked_by_is_outvoted_and_a_door_that_closes_is_learnt() {
 }
 
 #[test]
+fn a_scan_tells_of_a_cell_once_and_where_one_beam_ends_none_passes() {
+    let lattice = Lattice::new(Point::default(), 0.1, 50, 10);
+    let mut map = Occupancy::new(Parameters::default(), lattice);
+    let beam = |bearing: f64, range: f64| Beam { bearing, range, echo: true };
+    // Nine beams through the same cells; one of them ends early, at a post that the others graze.
+    let beams = (0..9).map(|i| beam(1e-4 * f64::from(i), if i == 4 { 2.0 } else { 4.0 }));
+    map.see(Pose::new(0.05, 0.55, 0.0), beams);
+    let odds = |x: f64| {
+        let p = map.probability(lattice.cell(Point::new(x, 0.55)).unwrap());
+        libm::log(p / (1.0 - p))
+    };
+    for (x, want) in [(1.05, -0.4), (2.05, 0.85), (3.05, -0.4), (4.05, 0.85), (4.55, 0.0)] {
+        assert!((odds(x) - want).abs() < 1e-6, "{} at {x}", odds(x));
+    }
+}
+
+#[test]
 fn what_sends_nothing_back_tells_only_what_is_free_as_far_as_one_looks() {
     let lattice = Lattice::new(Point::default(), 0.1, 100, 10);
     let mut map = Occupancy::new(Parameters { reach: 5.0, ..Parameters::default() }, lattice);
