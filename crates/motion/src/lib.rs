@@ -15,6 +15,7 @@
 //! | [`fusion`] | one command out of many offers |
 //! | [`ring`] | ranges around the robot, of a few sonars or of a laser |
 //! | [`safety`] | how fast is still safe, and where there is room |
+//! | [`soft_stop`] | whether it must stop by itself, and when it may go again |
 //! | [`wall`] | steering along a wall |
 //! | [`boundary`] | which ways a body fits through, and which of them is along the wall |
 //! | [`pursuit`] | following what a camera on a turning head sees |
@@ -35,6 +36,7 @@ pub mod odometry;
 pub mod pursuit;
 pub mod ring;
 pub mod safety;
+pub mod soft_stop;
 pub mod wall;
 pub mod word;
 
