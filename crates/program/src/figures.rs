@@ -130,6 +130,7 @@ fn trajectory(trail: &Trail, seen: &Seen) -> Trajectory {
         points: thinned(&seen.points.points),
         points_name: seen.points_name.to_owned(),
         radius: trail.radius(&seen.name),
+        outline: trail.outline(&seen.name),
         outline_every: (length / 100.0).ceil() * 5.0,
         goal: None,
         events: trail.events.clone(),

@@ -287,8 +287,10 @@ fn world_() -> Json {
 fn robot(kind: Option<&AgentType>) -> Json {
     let gate = kind.map(|kind| kind.params.as_slice()).unwrap_or_default();
     let driver = open_choice(["sim"], "Its driver: sim, carmen:FILE, ticks:FILE or replay:FILE.");
-    let rows =
-        [("driver", driver)].into_iter().chain(gate.iter().map(|field| (field.name, parameter(field))));
+    let model = json!({"enum": sim::model::NAMES, "description": "Its model, where it is simulated: h1 without a word."});
+    let rows = [("driver", driver), ("model", model)]
+        .into_iter()
+        .chain(gate.iter().map(|field| (field.name, parameter(field))));
     json!({
         "type": "object",
         "properties": object(rows),

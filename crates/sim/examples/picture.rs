@@ -136,7 +136,12 @@ fn top_view(simulator: &Simulator, path: &Path) -> Result<(), Box<dyn Error>> {
     }
     moment.things.iter().for_each(|thing| sheet.disc(thing.centre, thing.radius, thing.colour.0));
     for robot in &moment.robots {
-        sheet.disc(robot.pose.position(), robot.radius, [20, 20, 20]);
+        match robot.shape.corners(robot.pose) {
+            None => sheet.disc(robot.pose.position(), robot.shape.reach(), [20, 20, 20]),
+            Some(corners) => {
+                (0..4).for_each(|k| sheet.line(corners[k], corners[(k + 1) % 4], [20, 20, 20]));
+            }
+        }
         let ahead = robot.pose.position() + Point::polar(0.5, robot.pose.heading);
         sheet.line(robot.pose.position(), ahead, [255, 0, 0]);
     }

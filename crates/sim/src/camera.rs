@@ -18,6 +18,7 @@ use crate::plan::{Person, Thing};
 use crate::robot::Robot;
 use crate::shape::Circle;
 use crate::simulator::{RobotId, Simulator};
+use crate::solid::Solid;
 use types::chance::Stream;
 
 /// Nothing beyond this depth is drawn (m).
@@ -515,18 +516,24 @@ const SKIN: Colour = Colour([206, 164, 122]);
 fn machine(robot: &Robot, eye: Point, ray: Point, column: &mut Column) {
     let (at, tall) = (robot.truth.pose.position(), robot.model.height);
     let dark = Colour([48, 50, 54]);
-    if let Some((t, far, shade)) = cylinder(Circle { centre: at, radius: robot.model.radius }, eye, ray) {
+    let trunk = match robot.model.shape.solid(robot.truth.pose) {
+        Solid::Round(circle) => cylinder(circle, eye, ray),
+        Solid::Square(rectangle) => rectangle
+            .through(eye, ray)
+            .map(|(near, far, normal)| (near, far, face_shade(normal, eye + ray * near).0)),
+    };
+    if let Some((t, far, shade)) = trunk {
         let trunk = 0.62 * tall;
         column.level(t, far, trunk, robot.model.colour);
         column.upright(t, 0.02, 0.1 * tall, dark, shade);
         column.upright(t, 0.1 * tall, trunk, robot.model.colour, shade);
         column.upright(t, 0.29 * tall, 0.34 * tall, dark, shade);
     }
-    let neck = Circle { centre: at, radius: 0.2 * robot.model.radius };
+    let neck = Circle { centre: at, radius: 0.2 * robot.model.shape.inner() };
     if let Some((t, _, shade)) = cylinder(neck, eye, ray) {
         column.upright(t, 0.62 * tall, 0.86 * tall, dark, shade);
     }
-    let head = Circle { centre: at, radius: 0.45 * robot.model.radius };
+    let head = Circle { centre: at, radius: 0.45 * robot.model.shape.inner() };
     if let Some((t, _, shade)) = cylinder(head, eye, ray) {
         column.upright(t, 0.86 * tall, tall, robot.model.colour, shade);
     }

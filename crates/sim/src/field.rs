@@ -7,6 +7,7 @@ use libm::{fabs, floor, sqrt};
 use types::Point;
 
 use crate::shape::{Circle, Segment};
+use crate::solid::{Rectangle, Solid};
 
 /// Side of a cell (m). About the size of a robot: a body lies in four cells, a cell holds few segments.
 const CELL: f64 = 0.5;
@@ -39,10 +40,10 @@ pub(crate) struct Post {
     pub look: u32,
 }
 
-/// An upright cylinder that moves: a robot or a person.
+/// An upright cylinder or box that moves: a robot or a person.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Body {
-    pub circle: Circle,
+    pub solid: Solid,
     pub high: f64,
     /// A body that is hidden touches nothing and is seen by nothing.
     pub present: bool,
@@ -66,7 +67,7 @@ pub(crate) struct Hit {
 /// How near the nearest solid thing is.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Near {
-    /// From centre to surface (m).
+    /// From the centre or rim that was asked for to the surface (m).
     pub distance: f64,
     /// The nearest point of its surface.
     pub point: Point,
@@ -272,7 +273,8 @@ impl Field {
     /// Adds a body and gives its number.
     pub(crate) fn add_body(&mut self, body: Body) -> u32 {
         let id = self.bodies.len() as u32;
-        let block = self.block_around(body.circle.centre, body.circle.radius);
+        let (min, max) = body.solid.bounds();
+        let block = self.block(min, max);
         self.bodies.push(body);
         self.blocks.push(block);
         if self.bodies.len() <= CROWD {
@@ -284,10 +286,11 @@ impl Field {
     }
 
     /// Moves a body.
-    pub(crate) fn place_body(&mut self, id: u32, centre: Point) {
+    pub(crate) fn place_body(&mut self, id: u32, solid: Solid) {
         let index = id as usize;
-        self.bodies[index].circle.centre = centre;
-        let block = self.block_around(centre, self.bodies[index].circle.radius);
+        self.bodies[index].solid = solid;
+        let (min, max) = solid.bounds();
+        let block = self.block(min, max);
         let old = self.blocks[index];
         if block == old {
             return;
@@ -423,7 +426,7 @@ impl Field {
                 for &index in &self.bodies_in[cell] {
                     let body = &self.bodies[index as usize];
                     if index != skip
-                        && let Some(t) = body.circle.meet(origin, direction, best)
+                        && let Some(t) = body.solid.meet(origin, direction, best)
                         && body.present
                         && height <= body.high
                     {
@@ -446,12 +449,6 @@ impl Field {
                 best = Some(Near { distance, point });
             }
         };
-        let on_circle = |circle: Circle| {
-            let from = centre - circle.centre;
-            let length = sqrt(from.dot(from));
-            let out = if length > 0.0 { from * (1.0 / length) } else { Point::new(1.0, 0.0) };
-            (circle.centre + out * circle.radius, length - circle.radius)
-        };
         for cell in self.cells(self.block_around(centre, limit)) {
             let flags = self.flags[cell];
             if flags & HAS_STATIC != 0 {
@@ -466,7 +463,7 @@ impl Field {
                 for &index in self.posts_of(cell) {
                     let post = &self.posts[index as usize];
                     if post.low < height {
-                        let (point, distance) = on_circle(post.circle);
+                        let (distance, point) = post.circle.gap(centre);
                         offer(point, distance);
                     }
                 }
@@ -475,8 +472,57 @@ impl Field {
                 for &index in &self.bodies_in[cell] {
                     let body = &self.bodies[index as usize];
                     if index != skip && body.present {
-                        let (point, distance) = on_circle(body.circle);
+                        let (distance, point) = body.solid.gap_to_point(centre);
                         offer(point, distance);
+                    }
+                }
+            }
+        }
+        best
+    }
+
+    /// The nearest solid thing below `height` whose surface is less than `limit` from that of `solid` (m); `skip` is a body left out.
+    pub(crate) fn clearance(&self, solid: &Solid, limit: f64, height: f64, skip: u32) -> Option<Near> {
+        match solid {
+            Solid::Round(Circle { centre, radius }) => {
+                let near = self.nearest(*centre, radius + limit, height, skip)?;
+                Some(Near { distance: near.distance - radius, ..near })
+            }
+            Solid::Square(rectangle) => self.nearest_to(rectangle, limit, height, skip),
+        }
+    }
+
+    fn nearest_to(&self, this: &Rectangle, limit: f64, height: f64, skip: u32) -> Option<Near> {
+        let mut best: Option<Near> = None;
+        let mut reach = limit;
+        let mut offer = |(distance, point): (f64, Point)| {
+            if distance < reach {
+                reach = distance;
+                best = Some(Near { distance, point });
+            }
+        };
+        let (min, max) = Solid::Square(*this).bounds();
+        let margin = Point::new(limit, limit);
+        for cell in self.cells(self.block(min - margin, max + margin)) {
+            let flags = self.flags[cell];
+            if flags & HAS_STATIC != 0 {
+                let faces = self.faces_of(cell).iter().map(|&index| &self.faces[index as usize]);
+                faces
+                    .filter(|face| face.low < height)
+                    .for_each(|face| offer(this.gap_to_segment(&face.segment)));
+                let posts = self.posts_of(cell).iter().map(|&index| &self.posts[index as usize]);
+                posts
+                    .filter(|post| post.low < height)
+                    .for_each(|post| offer(this.gap_to_circle(post.circle)));
+            }
+            if flags & HAS_BODY != 0 {
+                for &index in self.bodies_in[cell].iter().filter(|&&index| index != skip) {
+                    let body = &self.bodies[index as usize];
+                    if body.present {
+                        offer(match &body.solid {
+                            Solid::Round(circle) => this.gap_to_circle(*circle),
+                            Solid::Square(other) => this.gap_to_rectangle(other),
+                        });
                     }
                 }
             }
@@ -546,9 +592,16 @@ mod tests {
         let mut field = Field::new(faces, posts, edges);
         for k in 0..20 {
             let draw = stream.sample(1000 + k);
-            let circle = Circle { centre: Point::new(0.0, 0.0), radius: 0.3 };
-            let id = field.add_body(Body { circle, high: 1.7, present: k % 7 != 0 });
-            field.place_body(id, Point::new(draw.between(0, -6.0, 6.0), draw.between(1, -6.0, 6.0)));
+            let solid = Solid::Round(Circle { centre: Point::new(0.0, 0.0), radius: 0.3 });
+            let id = field.add_body(Body { solid, high: 1.7, present: k % 7 != 0 });
+            let centre = Point::new(draw.between(0, -6.0, 6.0), draw.between(1, -6.0, 6.0));
+            let solid = if k % 3 == 0 {
+                let pose = types::Pose::new(centre.x, centre.y, draw.between(2, 0.0, TAU));
+                Solid::Square(Rectangle::new(pose, draw.between(3, 0.1, 2.0), draw.between(4, 0.1, 1.0), 0.1))
+            } else {
+                Solid::Round(Circle { centre, radius: 0.3 })
+            };
+            field.place_body(id, solid);
         }
         field
     }
@@ -558,13 +611,11 @@ mod tests {
         for face in &field.faces {
             best = face.segment.meet(origin, direction, best).unwrap_or(best);
         }
-        for circle in field
-            .posts
-            .iter()
-            .map(|p| p.circle)
-            .chain(field.bodies.iter().filter(|b| b.present).map(|b| b.circle))
-        {
-            best = circle.meet(origin, direction, best).unwrap_or(best);
+        for post in &field.posts {
+            best = post.circle.meet(origin, direction, best).unwrap_or(best);
+        }
+        for body in field.bodies.iter().filter(|body| body.present) {
+            best = body.solid.meet(origin, direction, best).unwrap_or(best);
         }
         best
     }
@@ -601,7 +652,8 @@ mod tests {
                 proptest::prop_assert!(seen[1][k] || !inside(post.circle.centre), "post {}", k);
             }
             for (k, body) in field.bodies.iter().enumerate() {
-                proptest::prop_assert!(seen[2][k] || !inside(body.circle.centre), "body {}", k);
+                let (low, high) = body.solid.bounds();
+                proptest::prop_assert!(seen[2][k] || !inside((low + high) * 0.5), "body {}", k);
             }
         }
 
@@ -614,10 +666,34 @@ mod tests {
             for face in &field.faces {
                 best = best.min(face.segment.nearest(centre).distance(centre));
             }
-            for circle in field.posts.iter().map(|p| p.circle).chain(
-                field.bodies.iter().filter(|b| b.present).map(|b| b.circle),
-            ) {
-                best = best.min(circle.centre.distance(centre) - circle.radius);
+            for post in &field.posts {
+                best = best.min(post.circle.centre.distance(centre) - post.circle.radius);
+            }
+            for body in field.bodies.iter().filter(|body| body.present) {
+                best = best.min(body.solid.gap_to_point(centre).0);
+            }
+            proptest::prop_assert!((found - best).abs() < 1e-12, "{} {}", found, best);
+        }
+
+        #[test]
+        fn the_nearest_to_a_rectangle_is_the_nearest_of_all(
+            x in -6f64..6., y in -6f64..6., turn in 0f64..TAU, length in 0.1f64..1., limit in 0.1f64..2.
+        ) {
+            let field = crowd();
+            let this = Rectangle::new(types::Pose::new(x, y, turn), length, 0.4, 0.1);
+            let found = field.clearance(&Solid::Square(this), limit, 0.5, NOBODY).map_or(limit, |near| near.distance);
+            let mut best = limit;
+            for face in &field.faces {
+                best = best.min(this.gap_to_segment(&face.segment).0);
+            }
+            for post in &field.posts {
+                best = best.min(this.gap_to_circle(post.circle).0);
+            }
+            for body in field.bodies.iter().filter(|body| body.present) {
+                best = best.min(match &body.solid {
+                    Solid::Round(circle) => this.gap_to_circle(*circle).0,
+                    Solid::Square(other) => this.gap_to_rectangle(other).0,
+                });
             }
             proptest::prop_assert!((found - best).abs() < 1e-12, "{} {}", found, best);
         }

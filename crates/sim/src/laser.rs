@@ -8,7 +8,7 @@ use crate::field::Field;
 use crate::model::Laser;
 use types::chance::Stream;
 
-/// The angle of beam `k` to the left of straight ahead (rad).
+/// The angle of beam `k` to the left of where the laser looks (rad).
 ///
 /// The beams are spread over the field with one at each end; over a full turn they are spread without a double one.
 pub fn beam_angle(laser: &Laser, k: u32) -> f64 {
@@ -18,7 +18,7 @@ pub fn beam_angle(laser: &Laser, k: u32) -> f64 {
 
 /// The directions of all beams in the frame of the robot.
 pub(crate) fn beams(laser: &Laser) -> Vec<Point> {
-    (0..laser.beams).map(|k| Point::polar(1.0, beam_angle(laser, k))).collect()
+    (0..laser.beams).map(|k| Point::polar(1.0, laser.heading + beam_angle(laser, k))).collect()
 }
 
 /// Fills `out` with the ranges of the beams.
@@ -32,7 +32,7 @@ pub(crate) fn scan(
     out: &mut [f32],
 ) -> usize {
     let (s, c) = sincos(pose.heading);
-    let origin = pose.position();
+    let origin = pose.position() + Point::new(c * laser.x - s * laser.y, s * laser.x + c * laser.y);
     let count = beams.len().min(out.len());
     for (pair, ranges) in out[..count].chunks_mut(2).enumerate() {
         // Two normal numbers come at the price of one.

@@ -5,11 +5,11 @@
 //! | what a world file says | [`plan`] |
 //! | what a robot is made of | [`model`] |
 //! | the running world | [`simulator`], with `robot` (motion, contacts) and `people` (scripts) |
-//! | sensors | `sonar`, [`laser`], [`camera`]; all are methods of [`Simulator`] |
+//! | sensors | `sonar`, [`laser`], [`camera`], [`landmarks`]; all are methods of [`Simulator`] |
 //! | what makes a run a success | [`goal`] |
 //! | what a seed changes | [`vary`], with [`free_way`] |
 //! | plain data to draw | [`snapshot`] |
-//! | rays, grid and chance underneath | [`shape`], `field`, [`types::chance`] |
+//! | rays, grid and chance underneath | [`shape`], `solid`, `field`, [`types::chance`] |
 //!
 //! There is no clock, file, thread or generator here. The same plan, seed and commands give the same bytes.
 #![forbid(unsafe_code)]
@@ -19,6 +19,7 @@ pub mod colour;
 mod field;
 pub mod free_way;
 pub mod goal;
+pub mod landmarks;
 pub mod laser;
 pub mod model;
 mod outline;
@@ -29,6 +30,7 @@ mod robot;
 pub mod shape;
 pub mod simulator;
 pub mod snapshot;
+mod solid;
 mod sonar;
 pub mod vary;
 

@@ -4,8 +4,11 @@ use types::geometry::{PI, Pose};
 use types::{Duration, Point, Time};
 
 use crate::field::Field;
+use crate::model::Shape;
 use crate::plan::{Person, Region, WorldPlan};
 use crate::robot::{Robot, STEP};
+use crate::shape::Circle;
+use crate::solid::Solid;
 
 /// People keep this far from a robot (m, surface to surface): they never walk into one.
 pub const POLITE: f64 = 0.15;
@@ -46,6 +49,11 @@ impl Walker {
             begins: None,
             plan: plan.clone(),
         }
+    }
+
+    /// What the person covers of the floor.
+    pub(crate) fn solid(&self) -> Solid {
+        Solid::Round(Circle { centre: self.at, radius: self.plan.radius })
     }
 
     /// Whether the person can ever do anything but stand.
@@ -126,7 +134,7 @@ impl Walker {
         let moved = next.distance(self.at);
         self.walking = true;
         self.at = next;
-        field.place_body(self.body, next);
+        field.place_body(self.body, self.solid());
         moved
     }
 
@@ -150,11 +158,19 @@ impl Walker {
 
     /// Whether no robot would be too near at `next`, or the step at least leads away from it.
     fn free(&self, next: Point, robots: &[Robot]) -> bool {
-        robots.iter().all(|robot| {
-            let centre = robot.truth.pose.position();
-            let keep = self.plan.radius + robot.model.radius + POLITE;
-            let distance = next.distance(centre);
-            distance >= keep || (self.present && distance > self.at.distance(centre))
+        robots.iter().all(|robot| match robot.model.shape {
+            Shape::Round { radius } => {
+                let centre = robot.truth.pose.position();
+                let keep = self.plan.radius + radius + POLITE;
+                let distance = next.distance(centre);
+                distance >= keep || (self.present && distance > self.at.distance(centre))
+            }
+            shape => {
+                let body = shape.solid(robot.truth.pose);
+                let distance = body.gap_to_point(next).0;
+                let keep = self.plan.radius + POLITE;
+                distance >= keep || (self.present && distance > body.gap_to_point(self.at).0)
+            }
         })
     }
 }

@@ -33,6 +33,8 @@ pub struct WorldPlan {
     pub people: Vec<Person>,
     /// Coloured things that stand by themselves.
     pub things: Vec<Thing>,
+    /// What sensors can tell from everything else.
+    pub landmarks: Vec<Landmark>,
     /// Named parts of the floor.
     pub regions: Vec<Region>,
 }
@@ -118,6 +120,32 @@ pub struct Thing {
     pub colour: Colour,
 }
 
+/// An upright tube in two colours that sensors can tell from everything else, and whose infrared transmitters tell who it is.
+///
+/// There are four transmitters, a quarter turn apart; each sends its own code, so whoever hears one knows the landmark and the
+/// side from which it hears.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Landmark {
+    /// Its name.
+    pub name: String,
+    /// Its number, from 1.
+    pub id: u32,
+    /// Its middle (m).
+    pub at: Point,
+    /// Where its first side looks (rad).
+    pub facing: f64,
+    /// Its radius (m); 0 is a mark without a body, such as one on a wall.
+    pub radius: f64,
+    /// Its height (m).
+    pub height: f64,
+    /// Colour of its lower half.
+    pub colour: Colour,
+    /// Colour of its upper half.
+    pub top: Colour,
+    /// Whether it has transmitters.
+    pub infrared: bool,
+}
+
 /// A person, who stands or follows a script.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Person {
@@ -187,6 +215,7 @@ impl Default for WorldPlan {
             rounds: Vec::new(),
             people: Vec::new(),
             things: Vec::new(),
+            landmarks: Vec::new(),
             regions: Vec::new(),
         }
     }
@@ -239,6 +268,23 @@ impl Default for Wall {
     /// A thin, light wall up to the ceiling.
     fn default() -> Wall {
         Wall { line: Vec::new(), thickness: 0.0, height: 2.6, colour: Colour([206, 204, 192]) }
+    }
+}
+
+impl Default for Landmark {
+    /// A tube of 10 cm, red below and green above, as high as a camera.
+    fn default() -> Landmark {
+        Landmark {
+            name: String::new(),
+            id: 1,
+            at: Point::default(),
+            facing: 0.0,
+            radius: 0.05,
+            height: 1.1,
+            colour: Colour([205, 22, 30]),
+            top: Colour([40, 150, 60]),
+            infrared: true,
+        }
     }
 }
 

@@ -5,7 +5,7 @@ use types::geometry::{PI, Pose, TAU, wrap};
 use types::{Point, Time};
 
 use crate::field::Field;
-use crate::model::{Battery, Head, Model};
+use crate::model::{Battery, Head, Model, Shape};
 use crate::sonar::Fan;
 use types::chance::Stream;
 
@@ -19,6 +19,10 @@ const TOUCH: f64 = 1e-6;
 const PUSHING: f64 = 1e-4;
 /// A touch ends when the clearance exceeds this (m).
 const RELEASE: f64 = 1e-3;
+/// Along an arc that turns corners the next look is at most this far on where something is near (m).
+const FINE: f64 = 5e-4;
+/// How far such a look goes (m): more than a corner moves in one step.
+const FEEL: f64 = 0.05;
 /// How much further than the closest clearance so far the neighbourhood is searched (m): the robot can move this far
 /// before it must look again.
 const LOOK_AHEAD: f64 = 0.25;
@@ -30,7 +34,7 @@ pub struct Truth {
     pub pose: Pose,
     /// How often it began to touch something.
     pub collisions: u32,
-    /// The smallest distance of its rim to anything so far (m); at most [`CLEARANCE_LIMIT`].
+    /// The smallest distance of its outline to anything so far (m); at most [`CLEARANCE_LIMIT`].
     pub closest: f64,
     /// Length of its way so far (m).
     pub distance: f64,
@@ -78,7 +82,29 @@ pub(crate) struct Streams {
     pub laser: Stream,
     pub gyro: Stream,
     pub camera: Stream,
+    pub landmarks: Stream,
+    pub infrared: Stream,
     slip: Stream,
+}
+
+/// Goes along an arc by what is surely free, and gives two parts of it: one that is free and a later one that is not.
+///
+/// A corner can pass a thin end of wall within a step, so the end of the step alone does not tell. No point moves further than
+/// `stride` (m) in the whole arc, so from a place with some clearance the arc is free for that clearance; where it is less than
+/// [`FINE`] the next look is that far on, and what is touched for less than that stays unseen.
+fn first_blocked(stride: f64, clearance: impl Fn(f64) -> f64) -> Option<(f64, f64)> {
+    let (mut free, mut part) = (0.0, 0.0);
+    loop {
+        let room = clearance(part);
+        if room < 0.0 && part > 0.0 {
+            return Some((free, part));
+        }
+        if part >= 1.0 || stride <= 0.0 {
+            return None;
+        }
+        free = part;
+        part = (part + room.max(FINE) / stride).min(1.0);
+    }
 }
 
 /// A robot and its state.
@@ -118,6 +144,8 @@ impl Robot {
             laser: stream("laser"),
             gyro: stream("gyro"),
             camera: stream("camera"),
+            landmarks: stream("landmarks"),
+            infrared: stream("infrared"),
             slip: stream("slip"),
         };
         let truth = Truth {
@@ -134,7 +162,7 @@ impl Robot {
             body,
             truth,
             head: HeadState::default(),
-            fan: model.sonar.as_ref().map(|sonar| Fan::new(sonar, model.radius)),
+            fan: model.sonar.as_ref().map(|sonar| Fan::new(sonar, &model.shape)),
             beams: model.laser.as_ref().map(crate::laser::beams).unwrap_or_default(),
             gyro_bias: model.gyro.bias * stream("gyro bias").normal(0),
             contact: None,
@@ -167,7 +195,7 @@ impl Robot {
         self.head_goal = HeadState { pan: limit(pan, max_pan), tilt: limit(tilt, max_tilt) };
     }
 
-    /// Turns the wheels for one step and gives the length of the way that follows (m).
+    /// Turns the wheels for one step and gives how far no point of the rim moves beyond what follows (m).
     pub(crate) fn turn_wheels(&mut self, now: Time, step: u64) -> f64 {
         self.turn_head();
         let drive = &self.model.drive;
@@ -197,7 +225,17 @@ impl Robot {
         let turn = (right - left) / (drive.axle * drive.axle_scale);
         self.motion = Motion { distance: (left + right) / 2.0, turn, wheels };
         self.used += self.model.battery.idle * STEP + self.model.battery.drive * fabs(self.motion.distance);
-        fabs(self.motion.distance)
+        self.stride()
+    }
+
+    /// How far no point of the rim moves beyond in this step (m): the length of the arc, and for what is not round the turn of
+    /// its furthest corner.
+    fn stride(&self) -> f64 {
+        let Motion { distance, turn, .. } = self.motion;
+        match self.model.shape {
+            Shape::Round { .. } => fabs(distance),
+            shape => fabs(distance) + fabs(turn) * shape.reach(),
+        }
     }
 
     fn turn_head(&mut self) {
@@ -212,7 +250,7 @@ impl Robot {
     pub(crate) fn travel(&mut self, field: &mut Field, drift: f64) {
         let Motion { distance, turn, wheels } = self.motion;
         let moved = distance != 0.0 || turn != 0.0;
-        self.reach -= fabs(distance) + drift;
+        self.reach -= self.stride() + drift;
         let mut part = 1.0;
         if self.reach > self.truth.closest {
             if moved {
@@ -231,7 +269,7 @@ impl Robot {
             self.truth.turned += turn * part;
             self.wheel_angles[0] += wheels[0] * part;
             self.wheel_angles[1] += wheels[1] * part;
-            field.place_body(self.body, self.truth.pose.position());
+            field.place_body(self.body, self.model.shape.solid(self.truth.pose));
         }
     }
 
@@ -239,19 +277,26 @@ impl Robot {
     fn approach(&mut self, field: &Field, distance: f64, turn: f64) -> f64 {
         let start = self.truth.pose;
         let limit = self.truth.closest + LOOK_AHEAD;
-        let (height, radius, body) = (self.model.height, self.model.radius, self.body);
+        let (height, shape, body) = (self.model.height, self.model.shape, self.body);
         let look = |part: f64, limit: f64| {
             let pose = if part == 0.0 { start } else { start.along_arc(distance * part, turn * part) };
-            let near = field.nearest(pose.position(), radius + limit, height, body);
-            (pose, near.map_or(limit, |near| near.distance - radius), near)
+            let near = field.clearance(&shape.solid(pose), limit, height, body);
+            (pose, near.map_or(limit, |near| near.distance), near)
         };
         let mut part = 1.0;
+        let first = match shape {
+            Shape::Round { .. } => None,
+            _ => first_blocked(self.stride(), |part| look(part, FEEL).1),
+        };
         let (mut pose, mut clearance, mut near) = look(1.0, limit);
-        if clearance < 0.0 {
+        if clearance < 0.0 || first.is_some() {
             // The last free part of the arc, to less than a nanometre. A robot that goes on pushing gets nowhere: one look
             // tells that.
-            let (mut free, mut blocked) = (0.0, 1.0);
+            let (mut free, mut blocked) = first.unwrap_or((0.0, 1.0));
             let pushing = self.touching && look(PUSHING, RELEASE).1 < 0.0;
+            if pushing {
+                free = 0.0;
+            }
             for _ in 0..if pushing { 0 } else { 30 } {
                 let middle = (free + blocked) / 2.0;
                 if look(middle, RELEASE).1 < 0.0 { blocked = middle } else { free = middle }

@@ -9,6 +9,8 @@ use crate::outline::{self, Look};
 use crate::people::Walker;
 use crate::plan::{Region, WorldPlan};
 use crate::robot::{Charge, HeadState, Robot, Truth};
+use crate::shape::Circle;
+use crate::solid::Solid;
 use crate::{laser, sonar};
 
 /// The physics step.
@@ -76,9 +78,9 @@ impl Simulator {
             .people
             .iter()
             .map(|person| {
-                let circle = crate::shape::Circle { centre: person.at, radius: person.radius };
+                let solid = Solid::Round(Circle { centre: person.at, radius: person.radius });
                 let body =
-                    field.add_body(Body { circle, high: person.height, present: person.appears.is_none() });
+                    field.add_body(Body { solid, high: person.height, present: person.appears.is_none() });
                 Walker::new(person, body, plan)
             })
             .collect();
@@ -106,11 +108,9 @@ impl Simulator {
             return Err(AddError::NoPlace);
         }
         let pose = Pose { heading: wrap(pose.heading), ..pose };
-        if let Some(near) = self.field.nearest(pose.position(), model.radius, model.height, u32::MAX) {
-            return Err(AddError::NotFree(near.distance));
-        }
-        let circle = crate::shape::Circle { centre: pose.position(), radius: model.radius };
-        let body = self.field.add_body(Body { circle, high: model.height, present: true });
+        let solid = model.shape.solid(pose);
+        self.check_free(&solid, pose, model.height, u32::MAX)?;
+        let body = self.field.add_body(Body { solid, high: model.height, present: true });
         self.robots.push(Robot::new(name, model, body, pose, self.seed));
         self.robots.iter_mut().for_each(Robot::look_again);
         Ok(RobotId(self.robots.len() as u32 - 1))
@@ -149,15 +149,21 @@ impl Simulator {
         if !(pose.x.is_finite() && pose.y.is_finite() && pose.heading.is_finite()) {
             return Err(AddError::NoPlace);
         }
-        let robot = &mut self.robots[id.index()];
-        let (model, body) = (&robot.model, robot.body);
-        if let Some(near) = self.field.nearest(pose.position(), model.radius, model.height, body) {
-            return Err(AddError::NotFree(near.distance));
-        }
-        robot.put(Pose { heading: wrap(pose.heading), ..pose });
-        self.field.place_body(body, pose.position());
+        let robot = &self.robots[id.index()];
+        let (solid, body) = (robot.model.shape.solid(pose), robot.body);
+        self.check_free(&solid, pose, robot.model.height, body)?;
+        self.robots[id.index()].put(Pose { heading: wrap(pose.heading), ..pose });
+        self.field.place_body(body, solid);
         self.robots.iter_mut().for_each(Robot::look_again);
         Ok(())
+    }
+
+    /// Whether nothing stands where a body of this height would.
+    fn check_free(&self, solid: &Solid, pose: Pose, height: f64, skip: u32) -> Result<(), AddError> {
+        match self.field.clearance(solid, 0.0, height, skip) {
+            Some(near) => Err(AddError::NotFree(near.point.distance(pose.position()))),
+            None => Ok(()),
+        }
     }
 
     /// Sets the speeds of the wheels (rad/s, forward positive). They hold until the next command or the motor watchdog.
@@ -276,12 +282,15 @@ impl Simulator {
         self.robots[id.index()].head
     }
 
-    /// Where a person or thing of this name is (m), and its radius (m); nothing while it is hidden or when there is none.
+    /// Where a person, thing or landmark of this name is (m), and its radius (m); nothing while it is hidden or when there is none.
     ///
     /// A thing that a person carries is found by its own name.
     pub fn locate(&self, name: &str) -> Option<(Point, f64)> {
         if let Some(thing) = self.plan.things.iter().find(|thing| thing.name == name) {
             return Some((thing.at, thing.radius));
+        }
+        if let Some(landmark) = self.plan.landmarks.iter().find(|landmark| landmark.name == name) {
+            return Some((landmark.at, landmark.radius));
         }
         self.people.iter().filter(|walker| walker.present).find_map(|walker| {
             if walker.plan.name == name {

@@ -3,6 +3,7 @@
 use types::{Point, Pose, Time};
 
 use crate::colour::Colour;
+use crate::model::Shape;
 use crate::plan::Region;
 use crate::simulator::Simulator;
 
@@ -48,8 +49,8 @@ pub struct RobotMark {
     pub name: String,
     /// Where it is.
     pub pose: Pose,
-    /// Its radius (m).
-    pub radius: f64,
+    /// Its outline on the floor.
+    pub shape: Shape,
     /// Where its head looks, in the world (rad).
     pub gaze: f64,
     /// Whether it touches something.
@@ -131,7 +132,7 @@ impl Simulator {
                 .map(|robot| RobotMark {
                     name: robot.name.clone(),
                     pose: robot.truth.pose,
-                    radius: robot.model.radius,
+                    shape: robot.model.shape,
                     gaze: robot.truth.pose.heading + robot.head.pan,
                     touching: robot.contact.is_some(),
                     colour: robot.model.colour,

@@ -8,8 +8,9 @@ use libm::{cos, sincos, sqrt, tan};
 use types::Point;
 
 use crate::field::{Field, Met, Scatterer};
-use crate::model::Sonar;
+use crate::model::{Shape, Sonar};
 use crate::shape::Circle;
+use crate::solid::Solid;
 use types::chance::Stream;
 
 /// Rays of a fan. With 5° between them the range of a face errs by less than 0.1 %.
@@ -22,14 +23,15 @@ const ORDER: [f64; RAYS] = [0.0, -1.0, 1.0, -2.0, 2.0, -3.0, 3.0];
 pub(crate) struct Fan {
     axes: Vec<Point>,
     rays: Vec<[Point; RAYS]>,
-    mount: f64,
+    /// How far each sits from the middle of the robot (m).
+    mounts: Vec<f64>,
     tangent: f64,
     oblique: f64,
 }
 
 impl Fan {
-    /// The ring of `sonar` on a rim of radius `mount` (m).
-    pub(crate) fn new(sonar: &Sonar, mount: f64) -> Fan {
+    /// The ring of `sonar` on the rim of a body.
+    pub(crate) fn new(sonar: &Sonar, shape: &Shape) -> Fan {
         let bearing = |which: u32| sonar.bearing(which);
         let apart = sonar.half_angle / 3.0;
         Fan {
@@ -37,7 +39,7 @@ impl Fan {
             rays: (0..sonar.count)
                 .map(|which| ORDER.map(|k| Point::polar(1.0, bearing(which) + k * apart)))
                 .collect(),
-            mount,
+            mounts: (0..sonar.count).map(|which| shape.rim(bearing(which))).collect(),
             tangent: tan(sonar.half_angle),
             oblique: cos(sonar.specular_angle),
         }
@@ -55,7 +57,7 @@ impl Fan {
         let (s, c) = sincos(pose.heading);
         let turn = |p: Point| Point::new(c * p.x - s * p.y, s * p.x + c * p.y);
         let axis = turn(self.axes[which]);
-        let origin = pose.position() + axis * self.mount;
+        let origin = pose.position() + axis * self.mounts[which];
         let mut best = sonar.max_range;
         for &ray in &self.rays[which] {
             let ray = turn(ray);
@@ -63,7 +65,7 @@ impl Fan {
                 let normal = match hit.met {
                     Met::Face(index) => field.faces[index as usize].segment.normal,
                     Met::Post(index) => outward(field.posts[index as usize].circle, origin + ray * hit.t),
-                    Met::Body(index) => outward(field.bodies[index as usize].circle, origin + ray * hit.t),
+                    Met::Body(index) => field.bodies[index as usize].solid.normal(origin, ray, hit.t),
                 };
                 if libm::fabs(ray.dot(normal)) >= self.oblique {
                     best = hit.t;
@@ -113,7 +115,14 @@ impl Fan {
             Scatterer::Body(index) => {
                 let other = &field.bodies[index as usize];
                 if index != body && other.present {
-                    offer(other.circle, 0.0, other.high);
+                    match &other.solid {
+                        Solid::Round(circle) => offer(*circle, 0.0, other.high),
+                        // Its upright edges scatter, as those of walls do.
+                        Solid::Square(rectangle) => rectangle
+                            .corners()
+                            .into_iter()
+                            .for_each(|centre| offer(Circle { centre, radius: 0.0 }, 0.0, other.high)),
+                    }
                 }
             }
         });

@@ -9,8 +9,10 @@ use types::geometry::{PI, TAU, wrap};
 use types::value::{Span, Table, Value};
 use types::{Duration, Point, Pose, Time};
 
+mod body;
 mod common;
 mod home;
+mod landmarks;
 
 const LABORATORY: &str = include_str!("../../../worlds/laboratory.toml");
 const ANNEX: &str = include_str!("../../../worlds/annex.toml");

@@ -17,7 +17,7 @@ use motion::limits::Limits;
 use sim::camera::Canvas;
 use sim::{Goal, Model, RobotId, WorldPlan};
 use types::messages::{
-    Battery, Bumper, Echo, Echoes, Encoding, Gyro, Head, Image, LaserScan, Twist, WheelTicks,
+    Battery, Bumper, Echo, Echoes, Encoding, Gyro, Head, Image, Landmarks, LaserScan, Twist, WheelTicks,
 };
 use types::{Duration, Name, Pose, Time};
 
@@ -25,7 +25,7 @@ pub use truth::{PersonMoment, RobotMoment, Truth};
 use world::World;
 
 use crate::cadence::Cadence;
-use crate::description::{CAMERA, ClockKind, HeadLimits, LASER, Periods, RobotDescription};
+use crate::description::{BASE, CAMERA, ClockKind, HeadLimits, LASER, Periods, RobotDescription};
 use crate::driver::{Driver, DriverError, Listening, Polled, Sink};
 use crate::gate::Permit;
 
@@ -90,28 +90,30 @@ pub fn raise(plan: &WorldPlan, seed: u64, robots: &[Robot]) -> Result<(Vec<Simul
 /// What a robot of this model is to its gate.
 pub fn describe(model: &Model) -> RobotDescription {
     let mut description = RobotDescription::bare("sim", ClockKind::Simulated);
-    let second = Duration::secs(1);
     description.periods = Periods {
-        // All cones at once: a ring fired in three groups of four at six metres takes a good 0.1 s, and 0.25 s leaves room.
-        sonar: model.sonar.map(|_| Duration::millis(250)),
-        scan: model.laser.map(|_| Duration::millis(100)),
-        image: model.camera.map(|_| Duration(second.0 / 15 + 1)),
-        ticks: Some(Duration::millis(20)),
-        bumper: Some(Duration::millis(100)),
-        gyro: Some(Duration::millis(10)),
-        battery: Some(second),
-        head: Some(Duration::millis(50)),
+        sonar: model.sonar.map(|sonar| sonar.period),
+        scan: model.laser.map(|laser| laser.period),
+        image: model.camera.map(|camera| camera.period),
+        ticks: Some(model.drive.period),
+        bumper: Some(model.bumper_period),
+        gyro: Some(model.gyro.period),
+        battery: Some(model.battery.period),
+        head: Some(model.head.period),
         pose: None,
+        landmarks: [model.landmarks.map(|it| it.period), model.infrared.map(|it| it.period)]
+            .into_iter()
+            .flatten()
+            .min(),
     };
     if let Some(laser) = &model.laser {
-        description.mount(LASER, Pose::default(), laser.height);
+        description.mount(LASER, laser.mount(), laser.height);
         description.beams = laser.beams as usize;
     }
     if let Some(camera) = &model.camera {
         description.mount(CAMERA, Pose::default(), camera.mount);
         description.picture = camera.width as usize * camera.height as usize * 3;
     }
-    for (k, place) in ring(model).into_iter().enumerate() {
+    for (k, place) in model.ring().into_iter().enumerate() {
         description.mount(&format!("sonar_{k}"), place, model.sonar.map_or(0.0, |sonar| sonar.height));
     }
     description.limits = Some(limits(model));
@@ -139,17 +141,6 @@ fn limits(model: &Model) -> Limits {
     }
 }
 
-/// Where the sonars sit on the rim and look.
-fn ring(model: &Model) -> Vec<Pose> {
-    let count = model.sonar.map_or(0, |sonar| sonar.count);
-    let place = |k: u32| {
-        let bearing = types::geometry::TAU * f64::from(k) / f64::from(count);
-        let at = types::Point::polar(model.radius, bearing);
-        Pose::new(at.x, at.y, types::geometry::wrap(bearing))
-    };
-    (0..count).map(place).collect()
-}
-
 /// When each sensor of one robot is read.
 #[derive(Debug)]
 struct Cadences {
@@ -161,6 +152,8 @@ struct Cadences {
     gyro: Cadence,
     battery: Cadence,
     head: Cadence,
+    landmarks: Cadence,
+    infrared: Cadence,
 }
 
 /// The driver of a simulated robot.
@@ -196,6 +189,8 @@ impl Simulated {
                 gyro: Cadence::every(periods.gyro),
                 battery: Cadence::every(periods.battery),
                 head: Cadence::every(periods.head),
+                landmarks: Cadence::every(model.landmarks.map(|sensor| sensor.period)),
+                infrared: Cadence::every(model.infrared.map(|sensor| sensor.period)),
             },
             description,
             echoes: empty_ring(model),
@@ -225,7 +220,7 @@ fn empty_ring(model: &Model) -> Echoes {
         range_min: sonar.min_range as f32,
         range_max: sonar.max_range as f32,
         cone: (2.0 * sonar.half_angle) as f32,
-        echoes: ring(model).into_iter().map(echo).collect(),
+        echoes: model.ring().into_iter().map(echo).collect(),
     }
 }
 
@@ -238,6 +233,9 @@ fn empty_scan(model: &Model) -> LaserScan {
         angle_step: (sim::laser::beam_angle(laser, 1) - first) as f32,
         range_min: 0.0,
         range_max: laser.max_range as f32,
+        mount_x: laser.x as f32,
+        mount_y: laser.y as f32,
+        mount_heading: laser.heading as f32,
         ..LaserScan::default()
     }
 }
@@ -303,6 +301,12 @@ impl Driver for Simulated {
                 *head = form;
                 sim.scan(id, sample, ranges)
             });
+        }
+        if let Some(sample) = due.landmarks.due(time).filter(|_| wanted.landmarks) {
+            sink.landmarks(stamp, &Landmarks { frame: Name::new(BASE), seen: sim.landmarks(id, sample) });
+        }
+        if let Some(sample) = due.infrared.due(time).filter(|_| wanted.landmarks) {
+            sink.landmarks(stamp, &Landmarks { frame: Name::new(BASE), seen: sim.infrared(id, sample) });
         }
         if let Some(sample) = due.image.due(time).filter(|_| wanted.image) {
             let (form, canvas) = (self.image, &mut self.canvas);

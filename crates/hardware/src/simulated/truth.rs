@@ -226,7 +226,7 @@ impl Truth {
                 .map(|(robot, moment)| RobotMark {
                     name: robot.name.clone(),
                     pose: moment.truth.pose,
-                    radius: robot.model.radius,
+                    shape: robot.model.shape,
                     gaze: moment.truth.pose.heading + moment.head.pan,
                     touching: moment.touching,
                     colour: robot.model.colour,

@@ -3,7 +3,7 @@
 use record::figure::{Drawing, Region};
 use serde_json::{Value as Json, json};
 use sim::snapshot::Scenery;
-use types::Point;
+use types::{Point, Pose};
 
 use super::Notes;
 use crate::run::Ready;
@@ -20,12 +20,16 @@ pub(crate) fn notes(ready: &Ready) -> Notes {
         notes.insert(SCENERY.into(), scenery(truth.scenery()).to_string());
     }
     let robots = ready.robots.iter().map(|robot| {
-        json!({
+        let mut row = json!({
             "name": robot.name,
-            "radius": robot.radius,
+            "radius": robot.shape.reach(),
             "recorded": robot.description.clock == hardware::ClockKind::Recorded,
             "command": command_of(ready, &robot.name),
-        })
+        });
+        if let Some(corners) = robot.shape.corners(Pose::default()) {
+            row["outline"] = corners.iter().map(|p| point(*p)).collect();
+        }
+        row
     });
     notes.insert(ROBOTS.into(), Json::Array(robots.collect()).to_string());
     notes
@@ -90,6 +94,8 @@ pub(super) fn drawing(notes: &Notes) -> Drawing {
 pub(super) struct KnownRobot {
     pub(super) name: String,
     pub(super) radius: f64,
+    /// The corners of its body around it (m); none of a round one.
+    pub(super) outline: Vec<Point>,
     /// The topic of what its wheels are told.
     pub(super) command: Option<String>,
 }
@@ -102,6 +108,7 @@ pub(super) fn robots(notes: &Notes) -> Vec<KnownRobot> {
         Some(KnownRobot {
             name: row["name"].as_str()?.to_owned(),
             radius: row["radius"].as_f64()?,
+            outline: row["outline"].as_array().into_iter().flatten().filter_map(read_point).collect(),
             command: row["command"].as_str().map(str::to_owned),
         })
     };

@@ -92,6 +92,14 @@ impl Trail {
         self.known.iter().find(|known| known.name == robot).map_or(0.225, |known| known.radius)
     }
 
+    /// The corners of a robot's body around it (m); none of a round one.
+    pub(super) fn outline(&self, robot: &str) -> Vec<Point> {
+        self.known
+            .iter()
+            .find(|known| known.name == robot)
+            .map_or_else(Vec::new, |known| known.outline.clone())
+    }
+
     fn is_robot(&self, name: &str) -> bool {
         self.known.iter().any(|known| known.name == name)
     }

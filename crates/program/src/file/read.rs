@@ -364,7 +364,7 @@ impl<'r> Reader<'r> {
             }
             Some(Err(error)) => self.mistakes.push(Mistake::new(place, error.to_string())),
             Some(Ok(hardware::Spec::Simulated)) => {
-                Model::h1().overridden(model, at, &OF_ROBOT, &mut self.mistakes);
+                Model::read(model, at, &OF_ROBOT, &mut self.mistakes);
             }
             Some(Ok(_)) => {
                 let gate = self.registry.get(ROBOT).map(|kind| kind.params.iter().map(|field| field.name));

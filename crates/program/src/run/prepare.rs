@@ -9,6 +9,7 @@ use hardware::robot::{CYCLE, RobotParams};
 use hardware::simulated::{self, Truth};
 use hardware::{Berth, ClockKind, Gate, Latch, RobotDescription, Spec};
 use runtime::{Admission, Params as _, Plan, Registry};
+use sim::model::Shape;
 use sim::{Drawn, Goal, Model, Vary, WorldPlan};
 use types::Duration;
 use types::value::{Mistake, Row, Span, Table};
@@ -30,8 +31,8 @@ pub(crate) struct Scenario {
 pub(crate) struct RobotReady {
     /// Its name.
     pub(crate) name: String,
-    /// Its outline (m); for drawing.
-    pub(crate) radius: f64,
+    /// Its outline; for drawing.
+    pub(crate) shape: Shape,
     /// What it is.
     pub(crate) description: RobotDescription,
     /// Its latch.
@@ -59,8 +60,8 @@ pub(crate) struct Ready {
     pub(crate) needs_wall: bool,
 }
 
-/// The radius of a robot of which nothing is known (m): that of the usual one.
-const USUAL_RADIUS: f64 = 0.225;
+/// The outline of a robot of which nothing is known: that of the usual one.
+const USUAL_SHAPE: Shape = Shape::Round { radius: 0.225 };
 
 impl Scenario {
     fn table(&self, name: &str) -> Table {
@@ -123,7 +124,7 @@ impl Scenario {
         };
         ready.needs_wall |= opened.driver.describe().clock == ClockKind::Wall;
         let gate = Gate::of(opened.driver, latch);
-        ready.enter(row, gate, USUAL_RADIUS, opened.report);
+        ready.enter(row, gate, USUAL_SHAPE, opened.report);
         Ok(())
     }
 
@@ -142,7 +143,7 @@ impl Scenario {
             let table = entry.and_then(|entry| entry.value.as_table()).cloned().unwrap_or_default();
             let at = entry.map(|entry| entry.at).unwrap_or_default();
             let elsewhere = gate_keys().chain(["driver", "start"]).collect::<Vec<_>>();
-            if let Some(model) = Model::h1().overridden(&table, at, &elsewhere, &mut mistakes) {
+            if let Some(model) = Model::read(&table, at, &elsewhere, &mut mistakes) {
                 let (name, start, goal) = (name.clone(), *start, goal.clone());
                 robots.push(simulated::Robot { name, model, start, goal });
             }
@@ -154,7 +155,7 @@ impl Scenario {
             .map_err(|error| self.wrong(vec![Mistake::new(rows[0].key_at, error.to_string())]))?;
         for (driver, robot) in drivers.into_iter().zip(&robots) {
             if let Some(row) = rows.iter().find(|row| row.key == robot.name) {
-                ready.enter(row, Gate::new(driver, Latch::private()), robot.model.radius, None);
+                ready.enter(row, Gate::new(driver, Latch::private()), robot.model.shape, None);
             }
         }
         (ready.truth, ready.goal) = (Some(truth), goal);
@@ -192,7 +193,7 @@ fn gate_keys() -> impl Iterator<Item = &'static str> {
 type Every = fn(&Periods) -> Option<Duration>;
 
 /// The readings of a robot that come by a clock of its own.
-const READINGS: [(&str, Every); 9] = [
+const READINGS: [(&str, Every); 10] = [
     ("sonar", |periods| periods.sonar),
     ("scan", |periods| periods.scan),
     ("image", |periods| periods.image),
@@ -202,6 +203,7 @@ const READINGS: [(&str, Every); 9] = [
     ("battery", |periods| periods.battery),
     ("head", |periods| periods.head),
     ("pose", |periods| periods.pose),
+    ("landmarks", |periods| periods.landmarks),
 ];
 
 impl Ready {
@@ -227,10 +229,10 @@ impl Ready {
     }
 
     /// Puts a gate behind the agent of its robot. Each gate is a type of agent of its own.
-    fn enter(&mut self, row: &Row, gate: Gate, radius: f64, report: Option<hardware::Report>) {
+    fn enter(&mut self, row: &Row, gate: Gate, shape: Shape, report: Option<hardware::Report>) {
         self.robots.push(RobotReady {
             name: row.key.clone(),
-            radius,
+            shape,
             description: gate.description().clone(),
             latch: gate.latch().clone(),
             counts: gate.counts(),

@@ -301,8 +301,11 @@ fn picture(truth: &Truth, heard: &Heard, columns: u16, rows: u16) -> String {
     }
     for robot in &snapshot.robots {
         let at = robot.pose.position();
-        dots.circle(at, robot.radius, ROBOT);
-        dots.line(at, at + Point::polar(2.0 * robot.radius, robot.pose.heading), ROBOT);
+        match robot.shape.corners(robot.pose) {
+            None => dots.circle(at, robot.shape.reach(), ROBOT),
+            Some(corners) => (0..4).for_each(|k| dots.line(corners[k], corners[(k + 1) % 4], ROBOT)),
+        }
+        dots.line(at, at + Point::polar(2.0 * robot.shape.reach(), robot.pose.heading), ROBOT);
         dots.letter(at, arrow(robot.pose.heading), ROBOT);
     }
     dots.text()

@@ -33,6 +33,8 @@ pub struct Trajectory {
     pub points_name: String,
     /// Radius of the robot's outline (m).
     pub radius: f64,
+    /// The corners of the robot in its own frame (m); without them it is drawn as a circle.
+    pub outline: Vec<Point>,
     /// An outline is drawn each time so many seconds are over (s); none where it is zero.
     pub outline_every: f64,
     /// Where the robot was to go.
@@ -53,6 +55,7 @@ impl Default for Trajectory {
             points: Vec::new(),
             points_name: "sonar".into(),
             radius: 0.25,
+            outline: Vec::new(),
             outline_every: 10.0,
             goal: None,
             events: Vec::new(),
@@ -130,7 +133,7 @@ impl Trajectory {
         }
     }
 
-    /// The robot as a circle with a line to where it looks.
+    /// The robot's outline with a line to where it looks.
     fn outlines(&self, picture: &mut Picture, frame: &Frame) {
         let mut next = f64::NEG_INFINITY;
         for waypoint in self.path.iter().filter(|_| self.outline_every > 0.0) {
@@ -141,12 +144,14 @@ impl Trajectory {
                     frame.at(x + self.radius * libm::cos(heading), y + self.radius * libm::sin(heading));
                 let at = frame.at(x, y);
                 let pen = Pen::new(POINT, 0.6);
-                picture.circle(
-                    at,
-                    frame.at_x(x + self.radius) - at[0],
-                    Some(Colour::hex(0xffffff).faint(0.6)),
-                    Some(pen),
-                );
+                let fill = Colour::hex(0xffffff).faint(0.6);
+                if self.outline.is_empty() {
+                    picture.circle(at, frame.at_x(x + self.radius) - at[0], Some(fill), Some(pen));
+                } else {
+                    let corner = |p: &Point| waypoint.pose.transform(*p);
+                    let corners = self.outline.iter().map(corner).map(|p| frame.at(p.x, p.y)).collect();
+                    picture.polygon(corners, Some(fill), Some(pen));
+                }
                 picture.line(vec![at, nose], pen);
             }
         }
