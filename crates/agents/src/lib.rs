@@ -15,6 +15,8 @@
 //! | [`image_tracker`] | HSI picture, head | the target, wishes for feet and head |
 //! | [`recogniser`] | a picture, head | whether a thing of a colour and shape is there, and where |
 //! | [`path_planner`] | ranges, odometry | a way to a place, and how good it is |
+//! | [`avoid`] | a scan, ranges, a goal | a wish to drive past what is near, and the situation |
+//! | [`navigator`] | a scan, odometry, a goal | a motion to the goal through what nobody told it |
 //! | [`coordinator`] | wishes, safety, decision | one command for the drive |
 //! | [`decision_maker`] | safety, target, risk, battery, odometry, load, signals | situations, goal, everybody's weight and orders, reasons |
 //! | [`resource_manager`] | the load of the computer, orders | periods, methods, budgets and rest for all |
@@ -24,6 +26,7 @@
 //! Nothing here knows a simulator or a driver: a robot's ports are wired by the names that stand at the agents' ports.
 #![forbid(unsafe_code)]
 
+pub mod avoid;
 pub mod camera;
 pub mod coordinator;
 pub mod decision_maker;
@@ -32,6 +35,7 @@ pub mod head;
 pub mod image_tracker;
 pub mod laser;
 pub mod lookout;
+pub mod navigator;
 pub mod odometry;
 pub mod path_planner;
 pub mod recogniser;
@@ -42,6 +46,7 @@ pub mod sonar;
 mod trust;
 pub mod wall_follower;
 
+pub use avoid::Avoid;
 pub use camera::Camera;
 pub use coordinator::Coordinator;
 pub use decision_maker::DecisionMaker;
@@ -50,6 +55,7 @@ pub use head::PanTilt;
 pub use image_tracker::ImageTracker;
 pub use laser::Laser;
 pub use lookout::Lookout;
+pub use navigator::Navigator;
 pub use odometry::DeadReckoning;
 pub use path_planner::PathPlanner;
 pub use recogniser::Recogniser;
@@ -71,6 +77,8 @@ pub fn registry() -> runtime::Registry {
         ImageTracker,
         Recogniser,
         PathPlanner,
+        Avoid,
+        Navigator,
         PanTilt,
         Coordinator,
         DriveBase,
@@ -98,6 +106,8 @@ mod tests {
             "image-tracker",
             "recogniser",
             "path-planner",
+            "avoid",
+            "navigator",
             "head",
             "coordinator",
             "drive",

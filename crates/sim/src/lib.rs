@@ -7,6 +7,7 @@
 //! | the running world | [`simulator`], with `robot` (motion, contacts) and `people` (scripts) |
 //! | sensors | `sonar`, [`laser`], [`camera`], [`landmarks`]; all are methods of [`Simulator`] |
 //! | what makes a run a success | [`goal`] |
+//! | worlds of the benchmark BARN, read and generated | [`barn`] |
 //! | what a seed changes | [`vary`], with [`free_way`] |
 //! | plain data to draw | [`snapshot`] |
 //! | rays, grid and chance underneath | [`shape`], `solid`, `field`, [`types::chance`] |
@@ -14,6 +15,7 @@
 //! There is no clock, file, thread or generator here. The same plan, seed and commands give the same bytes.
 #![forbid(unsafe_code)]
 
+pub mod barn;
 pub mod camera;
 pub mod colour;
 mod field;

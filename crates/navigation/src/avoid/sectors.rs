@@ -52,6 +52,13 @@ impl Sectors {
         &self.nearest
     }
 
+    /// Puts in all that another has.
+    pub fn add(&mut self, other: &Sectors) {
+        for (sector, range) in other.nearest.iter().enumerate() {
+            self.put(sector, *range);
+        }
+    }
+
     /// Puts in a point, given around the turning point (m).
     pub fn add_point(&mut self, point: Point) {
         let range = sqrt(point.dot(point));

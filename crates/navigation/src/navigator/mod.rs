@@ -20,11 +20,13 @@
 mod rollouts;
 mod route;
 mod surroundings;
+#[cfg(test)]
+mod tests;
 
 use libm::{fabs, fmax, fmin};
 use motion::ring::Ring;
 use types::geometry::{PI, wrap};
-use types::messages::Twist;
+use types::messages::{Doing, Navigation, Twist};
 use types::{Point, Pose};
 
 use crate::avoid::escape::{self, Escape, Phase, Room};
@@ -58,6 +60,8 @@ pub struct Parameters {
     pub margin: f64,
     /// More of it for each metre a second (s).
     pub margin_time: f64,
+    /// Highest speed into what was never seen (m/s).
+    pub unseen_max: f64,
     /// Room beyond the body's half width from which on more is no better for a way (m).
     pub plenty: f64,
     /// How far ahead a motion is played before it must be able to stop (s).
@@ -73,7 +77,8 @@ impl Parameters {
     ///
     /// 2 m/s² is what rubber wheels on a smooth floor give without slipping, to start, to brake and sideways half as much again; half a metre a second is as fast as it may go where it looks only by memory. 4 rad/s and
     /// 8 rad/s² turn a small robot. 0.1 s are a scan, a step and the lag of the motors. 3 cm around the body are the size of a cell and the
-    /// noise of a laser, and a centimetre more for each half metre a second what the wheels are late. 0.5 m beside it are plenty. Played for
+    /// noise of a laser, and four more for each metre a second what the wheels are late. 0.4 m/s are a slow walk, from which it stops in a hand's breadth.
+    /// 0.5 m beside it are plenty. Played for
     /// a second, then braked: farther ahead the way will be another one.
     pub fn new(body: Body, linear_max: f64) -> Parameters {
         Parameters {
@@ -87,39 +92,14 @@ impl Parameters {
             lateral_max: 3.0,
             latency: 0.1,
             margin: 0.03,
-            margin_time: 0.02,
+            margin_time: 0.04,
+            unseen_max: fmin(0.4, linear_max),
             plenty: 0.5,
             horizon: 1.0,
             goal_tolerance: 0.2,
             stale: 0.3,
         }
     }
-}
-
-/// What the navigator is doing.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum Doing {
-    /// Standing: it has seen nothing lately.
-    #[default]
-    Blind,
-    /// Standing at the goal.
-    Arrived,
-    /// Pursuing its way.
-    Pursuing,
-    /// Braking where that leaves most room.
-    Braking,
-    /// Avoiding what is near, for no pursuit of the way ends well.
-    Avoiding,
-    /// Turning in place towards the way.
-    Turning,
-    /// Backing off.
-    Backing,
-    /// Getting out of where it is stuck.
-    Escaping,
-    /// Standing: no way is open.
-    NoWay,
-    /// Standing: it was stuck and got out by no try.
-    GivenUp,
 }
 
 /// A scan as it is handed in.
@@ -133,19 +113,6 @@ pub struct Scan<'a> {
     pub beams: Ring<'a>,
     /// Ranges of so much and more met nothing (m).
     pub range_max: f64,
-}
-
-/// What to do, and why.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Orders {
-    /// The motion.
-    pub twist: Twist,
-    /// What it is about.
-    pub doing: Doing,
-    /// Room that the motion leaves around the body (m).
-    pub room: f64,
-    /// Length of the way that is left (m).
-    pub left: f64,
 }
 
 /// The navigator with all its memory.
@@ -169,6 +136,7 @@ impl Navigator {
         let cover = Cover::new(&parameters.body);
         let room = route::Room {
             least: cover.radius() + parameters.margin + 0.02,
+            tightest: cover.radius() - 0.02,
             plenty: fmin(half + parameters.plenty, surroundings::FAR),
         };
         Navigator {
@@ -200,6 +168,12 @@ impl Navigator {
         self.route.points()
     }
 
+    /// Begins with a new goal: what it gave up before is tried again, what it has seen is kept.
+    pub fn begin(&mut self) {
+        self.route.forget();
+        self.escape.reset();
+    }
+
     /// Forgets all that was seen, and that it gave up.
     pub fn forget(&mut self) {
         self.around.forget();
@@ -217,8 +191,8 @@ impl Navigator {
     }
 
     /// The motion at `now` (s) for a robot at `pose` that moves with `present`, towards `goal` in the frame of the odometry.
-    pub fn step(&mut self, now: f64, pose: Pose, present: Twist, goal: Point) -> Orders {
-        let stand = |doing: Doing| Orders { doing, ..Orders::default() };
+    pub fn step(&mut self, now: f64, pose: Pose, present: Twist, goal: Point) -> Navigation {
+        let stand = |doing: Doing| Navigation { doing, ..Navigation::default() };
         if self.seen.is_none_or(|at| now - at > self.parameters.stale) {
             return stand(Doing::Blind);
         }
@@ -237,9 +211,9 @@ impl Navigator {
         }
     }
 
-    fn orders(&self, pose: Pose, present: Twist, goal: Point) -> Orders {
+    fn orders(&mut self, pose: Pose, present: Twist, goal: Point) -> Navigation {
         if self.track.is_empty() {
-            return Orders { doing: Doing::NoWay, ..Orders::default() };
+            return Navigation { doing: Doing::NoWay, ..Navigation::default() };
         }
         // The wheels answer late: it acts from where the robot will be by then.
         let late = self.parameters.latency;
@@ -247,26 +221,26 @@ impl Navigator {
         let left = self.track.lengths_left();
         // Where nothing keeps all of the room, what keeps some of it is next.
         if let Some(best) = [1.0, 0.5, 0.0].into_iter().find_map(|care| self.best(from, care)) {
-            return Orders { twist: best.first, doing: Doing::Pursuing, room: best.room, left };
+            return Navigation { twist: best.first, doing: Doing::Pursuing, room: best.room, left };
         }
         if present.linear > 0.1 {
             let brake = self.brake(from);
-            return Orders { twist: brake.first, doing: Doing::Braking, room: brake.room, left };
+            return Navigation { twist: brake.first, doing: Doing::Braking, room: brake.room, left };
         }
         let target = self.track.ahead(0, 0.8);
         if let Some((twist, room)) = self.avoiding(pose, from, if left < 0.8 { goal } else { target }) {
-            return Orders { twist, doing: Doing::Avoiding, room, left };
+            return Navigation { twist, doing: Doing::Avoiding, room, left };
         }
         if let Some(back) = self.reverse(from) {
-            return Orders { twist: back.first, doing: Doing::Backing, room: back.room, left };
+            return Navigation { twist: back.first, doing: Doing::Backing, room: back.room, left };
         }
         if let Some((twist, room)) = self.turning(from, self.track.ahead(0, 0.4)) {
-            return Orders { twist, doing: Doing::Turning, room, left };
+            return Navigation { twist, doing: Doing::Turning, room, left };
         }
         if let Some((twist, room)) = self.backing(from) {
-            return Orders { twist, doing: Doing::Backing, room, left };
+            return Navigation { twist, doing: Doing::Backing, room, left };
         }
-        Orders { doing: Doing::NoWay, left, ..Orders::default() }
+        Navigation { doing: Doing::NoWay, left, ..Navigation::default() }
     }
 
     /// The rollout that comes farthest; a little room is worth a little way.
@@ -316,10 +290,9 @@ impl Navigator {
             .fold(brake(0), |best, other| if other.room > best.room + 1e-6 { other } else { best })
     }
 
-    fn avoiding(&self, pose: Pose, from: (Pose, Twist), target: Point) -> Option<(Twist, f64)> {
-        let mut smooth = self.smooth.clone();
+    fn avoiding(&mut self, pose: Pose, from: (Pose, Twist), target: Point) -> Option<(Twist, f64)> {
         let goal = pose.inverse().transform(target);
-        let out = smooth.step(Some(&self.sectors), goal);
+        let out = self.smooth.step(Some(&self.sectors), goal);
         let moves = out.twist.linear > 0.02;
         let room = self.sweep(from, out.twist, 0.5).filter(|_| moves)?;
         Some((out.twist, room))
@@ -347,9 +320,9 @@ impl Navigator {
     }
 
     /// The motion of an escape, if the body fits.
-    fn checked(&self, pose: Pose, present: Twist, twist: Twist) -> Orders {
+    fn checked(&self, pose: Pose, present: Twist, twist: Twist) -> Navigation {
         let room = self.sweep((pose, present), twist, 0.3);
-        Orders {
+        Navigation {
             twist: if room.is_some() { twist } else { Twist::ZERO },
             doing: Doing::Escaping,
             room: room.unwrap_or(0.0),

@@ -27,17 +27,26 @@ pub(super) struct Cover {
     places: [f64; DISCS],
     /// Their radius (m).
     radius: f64,
+    /// The middle and the corners of its front.
+    bow: [Point; 3],
 }
 
 impl Cover {
     pub(super) fn new(body: &Body) -> Cover {
+        let (front, half) = (body.front(), body.half_width());
+        let corner = |side: f64| match body {
+            Body::Round { .. } => Point::polar(front, side * 0.8),
+            Body::Rectangle { .. } => Point::new(front, side * half),
+        };
+        let bow = [corner(1.0), Point::new(front, 0.0), corner(-1.0)];
         match *body {
-            Body::Round { radius } => Cover { places: [0.0; DISCS], radius },
+            Body::Round { radius } => Cover { places: [0.0; DISCS], radius, bow },
             Body::Rectangle { front, rear, half_width } => {
                 let length = (front + rear) / DISCS as f64;
                 Cover {
                     places: std::array::from_fn(|i| -rear + (i as f64 + 0.5) * length),
                     radius: libm::hypot(length / 2.0, half_width),
+                    bow,
                 }
             }
         }
@@ -45,7 +54,12 @@ impl Cover {
 
     /// The same body seen by one who looks back.
     pub(super) fn reversed(&self) -> Cover {
-        Cover { places: self.places.map(|ahead| -ahead), radius: self.radius }
+        Cover { places: self.places.map(|ahead| -ahead), ..*self }
+    }
+
+    /// Whether what the front of the body comes into was seen: all of it.
+    fn sees(&self, around: &Surroundings, pose: Pose) -> bool {
+        self.bow.iter().all(|corner| around.is_known(pose.transform(*corner)))
     }
 
     /// The radius of the discs (m).
@@ -182,7 +196,8 @@ pub(super) fn play(
         let room = cover.room(around, pose);
         let kept = fmax(care * (parameters.margin + parameters.margin_time * fabs(twist.linear)), LEAST_ROOM);
         let needed = fmin(kept, began);
-        if room < needed {
+        let unseen = twist.linear > parameters.unseen_max && !cover.sees(around, pose);
+        if room < needed || unseen && care > 0.0 {
             return None;
         }
         least = fmin(least, room);

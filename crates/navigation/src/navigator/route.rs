@@ -33,8 +33,10 @@ const SMOOTHING: usize = 24;
 /// How near to what stands a way may lead.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Room {
-    /// Nearer than this it does not fit (m).
+    /// Nearer than this it shall not lead (m).
     pub(super) least: f64,
+    /// Nearer than this it does not fit (m): so near a way leads where there is no other.
+    pub(super) tightest: f64,
     /// From here on more room is no better (m), at most [`FAR`].
     pub(super) plenty: f64,
 }
@@ -43,6 +45,8 @@ pub(super) struct Room {
 #[derive(Clone, Debug)]
 pub(super) struct Route {
     room: Room,
+    /// Nearer than this the way of now does not lead (m).
+    least: f64,
     /// What a step onto a cell costs, by its distance to what stands in hundredths of [`FAR`].
     factors: [f32; 101],
     costs: Box<[u32]>,
@@ -66,6 +70,7 @@ impl Route {
         };
         Route {
             room,
+            least: room.least,
             factors: std::array::from_fn(factor),
             costs: vec![NONE; SIDE * SIDE].into_boxed_slice(),
             before: vec![NONE; SIDE * SIDE].into_boxed_slice(),
@@ -95,7 +100,11 @@ impl Route {
             self.points.clear();
             self.goal = goal;
         }
-        let Some(cost) = self.search(around, start, goal) else {
+        let found = [self.room.least, self.room.tightest].into_iter().find_map(|least| {
+            self.least = least;
+            self.search(around, start, goal)
+        });
+        let Some(cost) = found else {
             self.points.clear();
             return;
         };
@@ -150,7 +159,7 @@ impl Route {
     /// How many times more a step onto a cell costs; none where the robot does not fit.
     fn factor(&self, around: &Surroundings, cell: usize, start: usize) -> Option<f32> {
         let distance = around.distance(cell);
-        if distance >= self.room.least {
+        if distance >= self.least {
             return Some(self.by_distance(distance));
         }
         let apart = (cell % SIDE).abs_diff(start % SIDE).max((cell / SIDE).abs_diff(start / SIDE));
@@ -209,7 +218,7 @@ impl Route {
         for (i, pair) in points.windows(2).enumerate() {
             let distance = around.distance_at(pair[1]);
             // Where it is now the robot stands, so it fits.
-            if distance < self.room.least && i > AROUND {
+            if distance < self.least && i > AROUND {
                 return None;
             }
             cost += pair[0].distance(pair[1]) * f64::from(self.by_distance(distance));

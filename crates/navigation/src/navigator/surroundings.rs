@@ -30,6 +30,8 @@ pub(super) struct Surroundings {
     corner: (i32, i32),
     placed: bool,
     weights: Box<[u8]>,
+    /// Whether a beam has ever been in a cell.
+    known: Box<[bool]>,
     /// The scan that touched a cell last.
     touched: Box<[u16]>,
     scan: u16,
@@ -50,6 +52,7 @@ impl Surroundings {
             corner: (0, 0),
             placed: false,
             weights: vec![0; SIDE * SIDE].into_boxed_slice(),
+            known: vec![false; SIDE * SIDE].into_boxed_slice(),
             touched: vec![0; SIDE * SIDE].into_boxed_slice(),
             scan: 0,
             distances: vec![FAR as f32; SIDE * SIDE].into_boxed_slice(),
@@ -60,6 +63,7 @@ impl Surroundings {
 
     pub(super) fn forget(&mut self) {
         self.weights.fill(0);
+        self.known.fill(false);
         self.distances.fill(FAR as f32);
         self.placed = false;
     }
@@ -87,6 +91,7 @@ impl Surroundings {
         *hit = if known { std::array::from_fn(|i| mean(hit[i], new[i])) } else { new };
         self.weights[cell] = (self.weights[cell] + HIT).min(MOST);
         self.touched[cell] = self.scan;
+        self.known[cell] = true;
     }
 
     /// Whatever a beam passed is not there, or no longer.
@@ -101,6 +106,7 @@ impl Surroundings {
                 return;
             }
             let cell = row * SIDE + column;
+            self.known[cell] = true;
             if self.weights[cell] > 0 && self.touched[cell] != self.scan {
                 self.weights[cell] -= 1;
                 self.touched[cell] = self.scan;
@@ -121,6 +127,7 @@ impl Surroundings {
             return;
         }
         shift(&mut self.weights, dx, dy, 0);
+        shift(&mut self.known, dx, dy, false);
         shift(&mut self.touched, dx, dy, 0);
         shift(&mut self.hits, dx, dy, [128; 2]);
         self.corner = wanted;
@@ -165,6 +172,11 @@ impl Surroundings {
     pub(super) fn middle(&self, cell: usize) -> Point {
         let at = |cells: i32, corner: i32| (f64::from(cells + corner) + 0.5) * CELL;
         Point::new(at((cell % SIDE) as i32, self.corner.0), at((cell / SIDE) as i32, self.corner.1))
+    }
+
+    /// Whether a beam has ever been at a place.
+    pub(super) fn is_known(&self, point: Point) -> bool {
+        self.cell(point).is_some_and(|cell| self.known[cell])
     }
 
     pub(super) fn is_taken(&self, cell: usize) -> bool {

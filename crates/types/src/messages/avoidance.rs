@@ -1,4 +1,4 @@
-//! What an avoidance sees around the robot, and what it makes of it.
+//! What an avoidance sees around the robot and makes of it, and what a navigator is doing.
 
 use crate::message::{Field, Message};
 use crate::messages::Twist;
@@ -80,4 +80,47 @@ pub struct Avoidance {
     pub nearest: f64,
     /// Where that is (rad).
     pub nearest_bearing: f64,
+}
+
+/// What a navigator is doing.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Field)]
+#[repr(u8)]
+pub enum Doing {
+    /// Standing: it has seen nothing lately.
+    #[default]
+    Blind = 0,
+    /// Standing: it has no goal.
+    Idle = 1,
+    /// Standing at the goal.
+    Arrived = 2,
+    /// Pursuing its way.
+    Pursuing = 3,
+    /// Braking where that leaves most room.
+    Braking = 4,
+    /// Avoiding what is near, for no pursuit of the way ends well.
+    Avoiding = 5,
+    /// Turning in place towards the way.
+    Turning = 6,
+    /// Backing off.
+    Backing = 7,
+    /// Getting out of where it is stuck.
+    Escaping = 8,
+    /// Standing: no way is open.
+    NoWay = 9,
+    /// Standing: it was stuck, and no try got it out.
+    GivenUp = 10,
+}
+
+/// What a navigator makes of what it sees.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Message)]
+#[repr(C)]
+pub struct Navigation {
+    /// What it is doing.
+    pub doing: Doing,
+    /// The motion that follows.
+    pub twist: Twist,
+    /// Room that this leaves around the body until it stands (m).
+    pub room: f64,
+    /// Length of the way that is left, as far as it is known (m).
+    pub left: f64,
 }

@@ -15,7 +15,7 @@ mod ranges;
 mod reasons;
 mod sighting;
 
-pub use avoidance::{Avoidance, Situation};
+pub use avoidance::{Avoidance, Doing, Navigation, Situation};
 pub use body::{Battery, Bumper, Gyro, Head, WheelTicks};
 pub use command::{Amount, Direction, Drive, Offer, Twist, Verb, Word};
 pub use decision::{Decision, MOST_AGENTS, Row, Safety, Target};
