@@ -305,6 +305,10 @@ mod tests {
         let mut guard = looking(5.0, at(0));
         guard.touched = true;
         let told = guard.judge(&StopParams::default(), LASER, at(0));
-        assert_eq!((told.kind, told.allowed), (StopKind::Hard, f64::INFINITY), "the latch holds it, and it may back off after");
+        assert_eq!(
+            (told.kind, told.allowed),
+            (StopKind::Hard, f64::INFINITY),
+            "the latch holds it, and it may back off after"
+        );
     }
 }

@@ -24,6 +24,8 @@
 //! | [`process_supervisor`] | tasks, who lives | the mode: who is heard, and how |
 //! | [`real_time_supervisor`] | modes, tasks, reports of actions | the same for the real-time side, together; standing when one is silent |
 //! | [`localizer`] | scans, odometry, a floor plan | where the robot is on the floor, or that it is not known |
+//! | [`avoid`] | a scan, ranges, a goal | a wish to drive past what is near, and the situation |
+//! | [`navigator`] | a scan, odometry, a goal | a motion to the goal through what nobody told it |
 //! | [`coordinator`] | wishes, safety, decision, mode | one command for the drive |
 //! | [`decision_maker`] | safety, target, risk, battery, odometry, load, signals | situations, goal, everybody's weight and orders, reasons |
 //! | [`resource_manager`] | the load of the computer, orders | periods, methods, budgets and rest for all |
@@ -34,6 +36,7 @@
 #![forbid(unsafe_code)]
 
 mod action;
+pub mod avoid;
 pub mod camera;
 pub mod coordinator;
 pub mod decision_maker;
@@ -47,6 +50,7 @@ pub mod localizer;
 pub mod lookout;
 pub mod mover;
 pub mod navigation;
+pub mod navigator;
 pub mod odometry;
 pub mod path_follower;
 pub mod path_planner;
@@ -61,6 +65,7 @@ pub mod tour;
 mod trust;
 pub mod wall_follower;
 
+pub use avoid::Avoid;
 pub use camera::Camera;
 pub use coordinator::Coordinator;
 pub use decision_maker::DecisionMaker;
@@ -74,6 +79,7 @@ pub use localizer::Localizer;
 pub use lookout::Lookout;
 pub use mover::MoveAction;
 pub use navigation::Navigation;
+pub use navigator::Navigator;
 pub use odometry::DeadReckoning;
 pub use path_follower::PathFollower;
 pub use path_planner::PathPlanner;
@@ -108,6 +114,8 @@ pub fn registry() -> runtime::Registry {
         Tour,
         ProcessSupervisor,
         RealTimeSupervisor,
+        Avoid,
+        Navigator,
         PanTilt,
         Coordinator,
         DriveBase,
@@ -144,6 +152,8 @@ mod tests {
             "tour",
             "process-supervisor",
             "real-time-supervisor",
+            "avoid",
+            "navigator",
             "head",
             "coordinator",
             "drive",

@@ -5,6 +5,7 @@
 //!
 //! | module | from | to |
 //! |---|---|---|
+//! | [`avoid`] | what is around, and where the goal is | a motion past what is near, by the Nearness Diagram |
 //! | [`ground`] | where it is free, where something stands, where the robot has been | the way to the nearest new ground |
 //! | [`path`] | a grid, a start and a goal | the shortest way, or one at once and then better ones; smoothed, with a time table |
 //! | [`calibration`] | measurements of the robot itself | its wheels, and distances by sizes in the picture |
@@ -15,9 +16,11 @@
 //! | [`drift`] | a motion by the wheels | how far it may be off |
 //! | [`monte_carlo`] | motions and scans | the places where the robot may be, from none known |
 //! | [`localiser`] | what the wheels say, and scans | where the robot is on a known floor, or that it is not known |
+//! | [`navigator`] | a scan, the odometry and a goal | a motion to the goal through what nobody told it, as fast as there is room for |
 //! | [`roam`] | what is around, and the ground | a motion along the walls, through every gap, to where the robot has not been |
 #![forbid(unsafe_code)]
 
+pub mod avoid;
 pub mod calibration;
 pub mod drift;
 pub mod floor;
@@ -31,6 +34,7 @@ pub mod localiser;
 pub mod mapping;
 pub mod matching;
 pub mod monte_carlo;
+pub mod navigator;
 pub mod path;
 pub mod roam;
 mod search;

@@ -1,7 +1,7 @@
 //! Goals: stages in order over the truth of the world, each with a condition and, if wanted, a time for which it must hold.
 
 use types::value::{Mistake, Span, Table, TableReader};
-use types::{Duration, Time};
+use types::{Duration, Point, Time};
 
 use crate::plan::WorldPlan;
 use crate::read::{not_an_angle, read_angle};
@@ -34,6 +34,8 @@ pub enum Condition {
     Inside(String),
     /// Its middle is nearer than this to the middle of a person, thing or landmark (m).
     Near(String, f64),
+    /// It is farther than this from where it was when the stage began (m).
+    Moved(f64),
     /// Since the stage began its heading has turned by this much in all, to either side (rad).
     Turned(f64),
     /// It was nearer than this to a person who walks (m), for this time in all.
@@ -46,7 +48,7 @@ pub struct Progress {
     stage: usize,
     /// When the first stages were met.
     passed: [Time; TOLD],
-    began: Option<f64>,
+    began: Option<(f64, Point)>,
     held: Duration,
     followed: Duration,
     /// The last measure of the condition, for the explanation: a distance (m) or an angle (rad).
@@ -74,6 +76,7 @@ impl Goal {
     /// stage = [
     ///     { inside = "corridor" },
     ///     { near = "balloon", distance = 1.2, hold = "1s" },
+    ///     { moved = 0.5 },
     ///     { turned = "150deg" },
     ///     { follows = "guide", distance = 2.0, time = "10s" },
     /// ]
@@ -142,7 +145,7 @@ impl Goal {
         }
         // Several stages may be met at once, as when a robot starts inside the first region.
         while let Some(stage) = self.stages.get(progress.stage) {
-            let began = *progress.began.get_or_insert(truth.turned);
+            let began = *progress.began.get_or_insert((truth.turned, truth.pose.position()));
             if !progress.holds(&stage.condition, world, robot, began) {
                 progress.held = Duration::ZERO;
                 break;
@@ -209,7 +212,13 @@ impl Progress {
         &self.passed[..self.stage.min(TOLD)]
     }
 
-    fn holds(&mut self, condition: &Condition, world: &Simulator, robot: RobotId, began: f64) -> bool {
+    fn holds(
+        &mut self,
+        condition: &Condition,
+        world: &Simulator,
+        robot: RobotId,
+        began: (f64, Point),
+    ) -> bool {
         let truth = world.truth(robot);
         let at = truth.pose.position();
         match condition {
@@ -220,8 +229,13 @@ impl Progress {
                 self.measure = world.locate(what).map(|(place, _)| place.distance(at));
                 self.measure.is_some_and(|distance| distance < *within)
             }
+            Condition::Moved(distance) => {
+                let moved = at.distance(began.1);
+                self.measure = Some(moved);
+                moved >= *distance
+            }
             Condition::Turned(angle) => {
-                let turned = libm::fabs(truth.turned - began);
+                let turned = libm::fabs(truth.turned - began.0);
                 self.measure = Some(turned);
                 turned >= *angle
             }
@@ -244,6 +258,10 @@ impl Progress {
             }
             (Condition::Near(what, within), None) => {
                 format!("the robot was not within {within} m of \"{what}\"{hold} (it is not there)")
+            }
+            (Condition::Moved(distance), measure) => {
+                let moved = measure.unwrap_or(0.0);
+                format!("the robot had moved by {moved:.2} of {distance} m{hold}")
             }
             (Condition::Turned(angle), measure) => {
                 let turned = measure.unwrap_or(0.0).to_degrees();
@@ -288,15 +306,19 @@ fn read_stage(table: &Table, at: Span, world: &WorldPlan, mistakes: &mut Vec<Mis
             conditions.push(Condition::Near(word.to_owned(), distance));
         }
     }
+    let moves = reader.entry("moved").is_some();
+    if moves && let Some(distance) = reader.float_in("moved", 0.0, 1000.0) {
+        conditions.push(Condition::Moved(distance));
+    }
     if let Some(entry) = turned {
         match read_angle(&entry.value) {
             Some(angle) => conditions.push(Condition::Turned(libm::fabs(angle))),
             None => reader.report(not_an_angle("turned", entry)),
         }
     }
-    if conditions.len() > 1 || (conditions.is_empty() && turned.is_none()) {
+    if conditions.len() > 1 || (conditions.is_empty() && turned.is_none() && !moves) {
         reader.report(Mistake::new(at, "a stage has one condition").help(
-            "it can be: inside = \"region\", near = \"name\", turned = \"150deg\", follows = \"name\"",
+            "it can be: inside = \"region\", near = \"name\", moved = 0.5, turned = \"150deg\", follows = \"name\"",
         ));
     }
     reader.finish(mistakes);

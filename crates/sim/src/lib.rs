@@ -9,6 +9,7 @@
 //! | what a hand does to it meanwhile | [`hand`] |
 //! | sensors | `sonar`, [`laser`], [`camera`], [`landmarks`]; all are methods of [`Simulator`] |
 //! | what makes a run a success | [`goal`] |
+//! | worlds of the benchmark BARN, read and generated | [`barn`] |
 //! | what a seed changes | [`vary`], with [`free_way`] |
 //! | plain data to draw | [`snapshot`] |
 //! | rays, grid and chance underneath | [`shape`], `solid`, `field`, [`types::chance`] |
@@ -16,6 +17,7 @@
 //! There is no clock, file, thread or generator here. The same plan, seed and commands give the same bytes.
 #![forbid(unsafe_code)]
 
+pub mod barn;
 pub mod building;
 pub mod camera;
 pub mod colour;

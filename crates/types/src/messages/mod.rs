@@ -1,5 +1,6 @@
 //! The messages of the abstract robot and of the agents that come with Sinew.
 
+mod avoidance;
 mod body;
 mod command;
 mod decision;
@@ -19,6 +20,7 @@ mod stop;
 mod task;
 mod world;
 
+pub use avoidance::{Avoidance, Doing, Navigation, Situation};
 pub use body::{Battery, Bumper, Gyro, Head, WheelTicks};
 pub use command::{Amount, Direction, Drive, Offer, Twist, Verb, Word};
 pub use decision::{Decision, MOST_AGENTS, Row, Safety, Target};
