@@ -4,7 +4,7 @@ use motion::kinematics::Differential;
 use motion::limits::Limits;
 use runtime::Input;
 use types::messages::{Mode, Odometry, Offer, Report, Task, Twist};
-use types::{Duration, Pose, Time};
+use types::{Duration, Point, Pose, Time};
 
 use crate::odometry::ODOM;
 
@@ -107,6 +107,16 @@ impl Whereabouts {
         }
         if let Some(then) = odometry.at(stamp).map(|found| found.value().pose) {
             self.correct(found, then, stamp);
+        }
+    }
+
+    /// Where a task leads, in the frame of the wheels; nothing without a task, or where nobody knows where the map is.
+    pub(crate) fn goal(&self, task: &Task) -> Option<Point> {
+        let goal = task.target.position();
+        match task.frame.as_str() {
+            _ if task.number == 0 => None,
+            ODOM => Some(goal),
+            _ => Some(self.map_from_odometry?.inverse().transform(goal)),
         }
     }
 

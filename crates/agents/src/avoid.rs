@@ -1,4 +1,6 @@
 //! The avoidance: towards a goal past what is near, by what is seen at this moment, with the situation that says why.
+//!
+//! As an action beside others it wishes to drive only while something is in the way or near: who stands below it then drives to the goal.
 
 use motion::ring::Ring;
 use navigation::avoid::nearness::{self, NearnessDiagram};
@@ -6,10 +8,13 @@ use navigation::avoid::smooth::{self, SmoothNearness};
 use navigation::avoid::{Body, Sectors};
 use runtime::{Agent, Fault, Input, Output, Step};
 use types::geometry::PI;
-use types::messages::{Avoidance, Drive, LaserScan, Odometry, Offer, Path as Way, Ranges, Situation};
+use types::messages::{
+    Avoidance, Drive, LaserScan, Mode, Motion, Odometry, Offer, Path as Way, Ranges, Report, Situation, Task,
+};
 use types::params::Params;
 use types::{Duration, Point, Pose, Text, Time};
 
+use crate::action::{Duty, NOTHING, Whereabouts, offer};
 use crate::shared::echoes;
 
 /// How it avoids.
@@ -106,12 +111,22 @@ pub struct Avoid {
     odometry: Input<Odometry>,
     /// Where to: the end of the way, in the frame of the odometry. One without points takes the goal away.
     goal: Input<Way>,
+    /// Whether it is heard. Where it is not wired, it is.
+    mode: Input<Mode>,
+    /// Where to: it avoids while the task is to go to a place.
+    task: Input<Task>,
+    /// Where the robot is on the map, from the localizer: for tasks whose goal is there.
+    pose: Input<Odometry>,
     /// A wish to drive.
     drive: Output<Offer>,
+    /// That it is there.
+    report: Output<Report>,
     /// The situation, and the numbers that say why.
     #[port(history = 64)]
     situation: Output<Avoidance>,
     params: AvoidParams,
+    duty: Duty,
+    place: Whereabouts,
     sight: Sight,
 }
 
@@ -129,8 +144,18 @@ impl Agent for Avoid {
         if let Some(goal) = self.goal.newest() {
             self.sight.heard = Some(goal.points.last().map(|end| Point::from(*end)));
         }
-        if let Some(odometry) = self.odometry.latest() {
+        self.place.listen(&mut self.odometry, &mut self.pose, step.now);
+        if let Some(odometry) = self.place.odometry {
             self.sight.pose = odometry.pose;
+        }
+        let is_action = self.task.is_wired();
+        if is_action {
+            self.duty.listen(&mut self.mode, &mut self.task);
+            let task = self.duty.task(step.name_of(step.agent).unwrap_or_default().as_str());
+            let goal =
+                task.filter(|task| task.motion == Motion::Goto).and_then(|task| self.place.goal(&task));
+            self.sight.heard = Some(goal);
+            self.report.send(NOTHING);
         }
         if let Some(scan) = self.scan.newest() {
             self.sight.laser.scan(&scan, scan.row(), scan.header().stamp);
@@ -140,6 +165,14 @@ impl Agent for Avoid {
         }
         let wired = (self.scan.is_wired(), self.ranges.is_wired());
         let Some(out) = self.sight.step(&self.params, wired, step.now) else { return Ok(()) };
+        if is_action {
+            // What is free it leaves to others, and what it offers no longer than it takes to look again.
+            if out.situation.is_reason() {
+                self.drive.send(offer(out.twist, step.now));
+            }
+            self.situation.send(out);
+            return Ok(());
+        }
         self.drive.send(Offer {
             twist: out.twist,
             weight: if out.situation == Situation::AtGoal { 0.0 } else { self.params.weight },

@@ -211,8 +211,9 @@ impl Guard {
         let step = |is_way: bool, sign: f64, stopping: &mut Stopping| {
             stopping.set_parameters(params.law());
             let speed = if is_way { self.motion.linear.abs() } else { 0.0 };
-            // On the spot it meets nothing; the way that counts is that of setting off.
-            let along = sign * speed.max(params.least.max(STANDING));
+            // From standing the way that counts is that of setting off: who turns more than drives meets less.
+            let off = if stands && is_way { self.wish.linear.abs() } else { speed };
+            let along = sign * off.max(STANDING);
             let ahead = self.ahead(params, Twist::new(along, turn), sees, now);
             (stopping.step(ahead, Twist::new(sign * speed, turn), dt), ahead.is_none())
         };

@@ -127,11 +127,7 @@ fn goal(is_asked: bool, task: Option<&Task>, own: Point, place: &Whereabouts) ->
     if !is_asked {
         return Some(own);
     }
-    let task = task.filter(|task| task.motion == Motion::Path && task.number > 0)?;
-    if task.frame.as_str() == ODOM {
-        return Some(task.target.position());
-    }
-    Some(place.map_from_odometry?.inverse().transform(task.target.position()))
+    place.goal(task.filter(|task| task.motion == Motion::Path)?)
 }
 
 /// What is known of the floor, and where the robot is.

@@ -36,6 +36,11 @@ pub enum Situation {
 }
 
 impl Situation {
+    /// Whether it is a reason to drive otherwise than straight to the goal.
+    pub const fn is_reason(self) -> bool {
+        !matches!(self, Situation::HighSafetyGoalInRegion | Situation::AtGoal)
+    }
+
     /// The short name by which the literature calls it, or a word.
     pub const fn label(self) -> &'static str {
         match self {
