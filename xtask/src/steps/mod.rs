@@ -8,6 +8,7 @@ mod lessons;
 mod live;
 mod log;
 mod new_agent;
+mod reactive;
 mod realtime;
 mod recorded;
 mod repeat;

@@ -2,7 +2,7 @@
 
 use serde_json::Value;
 
-use super::{Done, sinew};
+use super::{Done, reactive, sinew};
 use crate::failure::Failure;
 use crate::tool::Tool;
 use crate::workspace::Workspace;
@@ -42,6 +42,7 @@ pub(super) fn run(workspace: &Workspace) -> Result<Done, Failure> {
         return Err(Failure::new("overload: there is no figure bands.png".to_owned(), remedy("overload")));
     }
     seen.push("overload managed".to_owned());
+    seen.push(reactive::run(workspace, &program)?);
     Ok(Done::Passed(seen.join(", ")))
 }
 

@@ -1,0 +1,132 @@
+//! The reactive layer: what is asked of it in the scenario `reactive`, and a thousand goals by the pose of the localizer alone.
+
+use serde_json::Value;
+
+use super::sinew;
+use crate::failure::Failure;
+use crate::tool::Tool;
+use crate::workspace::Workspace;
+
+/// How the tasks of the scenario end, in their order. The second goal lies behind a crate, and it goes there straight; the twelfth drives
+/// against a step that no sensor sees.
+const ENDS: [&str; 13] = [
+    "arrived",
+    "unreachable",
+    "arrived",
+    "arrived",
+    "arrived",
+    "arrived",
+    "arrived",
+    "arrived",
+    "arrived",
+    "arrived",
+    "arrived",
+    "unreachable",
+    "arrived",
+];
+/// The figures of its parts.
+const FIGURES: [&str; 7] = ["goto", "goto-avoid", "move", "turns", "soft-stop", "path", "hard-stop"];
+/// So far from their places robots may truly be when they tell that they have arrived (m).
+const OFF: f64 = 0.02;
+/// The same at the end of a path, which is as long as the robot counts it (m).
+const OFF_PATH: f64 = 0.04;
+const GOALS: usize = 1000;
+
+/// Runs both; says what was seen.
+pub(super) fn run(workspace: &Workspace, program: &std::path::Path) -> Result<String, Failure> {
+    let out = workspace.fresh_scratch("reactive")?;
+    let words = ["run", "reactive", "--json", "--out"];
+    let all = sinew::document(Tool::new(program, &workspace.root).args(words).arg(&out), REMEDY)?;
+    parts(&all).map_err(|what| Failure::new(format!("reactive: {what}"), REMEDY))?;
+    if let Some(name) = FIGURES.iter().find(|name| !out.join(format!("{name}.png")).is_file()) {
+        return Err(Failure::new(format!("reactive: there is no figure {name}.png"), REMEDY));
+    }
+    let out = workspace.fresh_scratch("goals")?;
+    let random = format!("agent.tour.random={GOALS}");
+    let words = ["run", "goals", "--set", &random, "--for", "7h", "--json", "--out"];
+    let goals = sinew::document(Tool::new(program, &workspace.root).args(words).arg(&out), REMEDY)?;
+    let most = all_reached(&goals).map_err(|what| Failure::new(format!("goals: {what}"), REMEDY))?;
+    // Its log is of more than a gigabyte.
+    let _ = std::fs::remove_dir_all(&out);
+    Ok(format!("reactive, {GOALS} goals at most {:.0} mm off", most * 1e3))
+}
+
+const REMEDY: &str = "Look at it: cargo run --release -- run reactive, and run goals; their figures lie in the folders that the summaries name.";
+
+fn tasks(run: &Value) -> Result<&Vec<Value>, String> {
+    run["tasks"].as_array().ok_or_else(|| "the document has no \"tasks\"".to_owned())
+}
+
+fn parts(run: &Value) -> Result<(), String> {
+    let tasks = tasks(run)?;
+    for (i, expected) in ENDS.iter().enumerate() {
+        let number = i as u64 + 1;
+        let task = tasks.iter().find(|task| task["task"] == number);
+        let Some(task) = task else { return Err(format!("task {number} did not end")) };
+        if task["ended"] != *expected {
+            return Err(format!("task {number} ended {}, not \"{expected}\": {task}", task["ended"]));
+        }
+        let off = task["off_m"].as_f64().unwrap_or(0.0);
+        if *expected == "arrived" && off > OFF_PATH {
+            return Err(format!("task {number} arrived {off} m off"));
+        }
+    }
+    // The step, once; nothing else.
+    if run["collisions"] != 1 {
+        return Err(format!("{} collisions, and one is asked for", run["collisions"]));
+    }
+    Ok(())
+}
+
+/// The most that a robot was off.
+fn all_reached(run: &Value) -> Result<f64, String> {
+    let tasks = tasks(run)?;
+    if tasks.len() != GOALS {
+        return Err(format!("{} of {GOALS} tasks ended", tasks.len()));
+    }
+    let mut most = 0.0_f64;
+    for task in tasks {
+        let off = task["off_m"].as_f64().unwrap_or(f64::INFINITY);
+        if task["ended"] != "arrived" || off > OFF {
+            return Err(format!("not reached within {OFF} m: {task}"));
+        }
+        most = most.max(off);
+    }
+    match run["collisions"].as_u64() {
+        Some(0) => Ok(most),
+        _ => Err(format!("collisions: {}", run["collisions"])),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use serde_json::json;
+
+    fn task(number: usize, ended: &str, off: f64) -> Value {
+        json!({"task": number, "ended": ended, "off_m": off})
+    }
+
+    #[test]
+    fn a_part_that_ends_otherwise_is_named() {
+        let mut tasks: Vec<Value> = (0..).zip(ENDS).map(|(i, ended)| task(i + 1, ended, 0.01)).collect();
+        let run = |tasks: &[Value], collisions: u64| json!({"tasks": tasks, "collisions": collisions});
+        assert_eq!(parts(&run(&tasks, 1)), Ok(()));
+        assert!(parts(&run(&tasks, 2)).unwrap_err().contains("2 collisions"));
+        assert!(parts(&run(&tasks[..12], 1)).unwrap_err().contains("task 13"));
+        tasks[3] = task(4, "arrived", 0.3);
+        assert!(parts(&run(&tasks, 1)).unwrap_err().contains("task 4 arrived 0.3 m off"));
+        tasks[2] = task(3, "timed out", 0.0);
+        assert!(parts(&run(&tasks, 1)).unwrap_err().contains("task 3 ended \"timed out\""));
+    }
+
+    #[test]
+    fn a_goal_that_is_missed_is_named() {
+        let mut tasks: Vec<Value> = (1..=GOALS).map(|i| task(i, "arrived", 0.011)).collect();
+        let run = |tasks: &[Value]| json!({"tasks": tasks, "collisions": 0});
+        assert_eq!(all_reached(&run(&tasks)), Ok(0.011));
+        assert!(all_reached(&run(&tasks[1..])).unwrap_err().contains("999 of 1000"));
+        tasks[7] = task(8, "arrived", 0.021);
+        assert!(all_reached(&run(&tasks)).unwrap_err().contains("0.021"));
+    }
+}
