@@ -142,6 +142,8 @@ struct Desk {
     /// How it ended, where it was this agent that ended it.
     ended: Option<Progress>,
     pose: Option<(Pose, Time)>,
+    /// Whether the real-time side has the task.
+    confirmed: bool,
     /// Since when the planner finds no way.
     no_way: Option<Time>,
     told: Option<(Report, Time)>,
@@ -216,7 +218,7 @@ impl Desk {
         self.count += 1;
         self.task = Task { number: self.count, ..task };
         self.report = Report { task: self.count, progress: Progress::Underway, ..Report::default() };
-        self.ended = None;
+        (self.ended, self.confirmed) = (None, false);
         self.task
     }
 
@@ -242,8 +244,15 @@ impl Desk {
     }
 
     fn hear(&mut self, report: &Report) {
-        if report.task == self.report.task && report.task != 0 && self.ended.is_none() {
+        if self.ended.is_some() || self.report.task == 0 || self.report.progress.is_over() {
+            return;
+        }
+        if report.task == self.report.task {
             self.report = *report;
+            self.confirmed = true;
+        } else if self.confirmed {
+            // The real-time side had it and has it no more: somebody changed the mode, or somebody whom it needs has died.
+            self.report.progress = Progress::Halted;
         }
     }
 
@@ -330,6 +339,20 @@ mod tests {
         assert_eq!(desk.news(at(12001)).map(|report| report.progress), Some(Progress::Unreachable));
         desk.hear(&Report { task: 1, progress: Progress::Halted, ..Report::default() });
         assert_eq!(desk.news(at(13000)), None, "that it stands now is no news of the task");
+    }
+
+    #[test]
+    fn a_task_that_the_real_time_side_drops_is_halted_and_one_that_it_has_not_yet_is_not() {
+        let (params, mut desk) = (NavigationParams::default(), Desk::default());
+        desk.goal(&params, &goal(3.0, 1.0), at(0)).unwrap();
+        let status = |task| Report { task, progress: Progress::Underway, ..Report::default() };
+        desk.hear(&status(0));
+        assert_eq!(desk.report.progress, Progress::Underway, "it is on its way there");
+        desk.hear(&status(1));
+        desk.hear(&Report::default());
+        assert_eq!(desk.report.progress, Progress::Halted);
+        desk.hear(&status(1));
+        assert_eq!(desk.report.progress, Progress::Halted, "it stays so");
     }
 
     #[test]

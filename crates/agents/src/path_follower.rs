@@ -2,11 +2,12 @@
 
 use motion::track::{self, Mode as Following, Track};
 use runtime::{Agent, Fault, Input, Output, Step};
+use types::geometry::wrap;
 use types::messages::{
     Mode, Motion, Odometry, Offer, Path, Progress, Report, Safety, Task, Twist, WAYPOINTS,
 };
 use types::params::Params;
-use types::{Point, Pose, Sequence};
+use types::{Duration, Point, Pose, Sequence};
 
 use crate::action::{Duty, NOTHING, Whereabouts, bounded, limits, offer};
 use crate::odometry::ODOM;
@@ -48,6 +49,9 @@ pub struct FollowerParams {
     /// The end of the path counts as the goal within this of it (m): a goal that stands in something is neared only so far, and that is told as unreachable.
     #[param(default = 0.15, min = 0.01, max = 5.0)]
     pub goal_near: f64,
+    /// When it wishes to drive and gets nowhere for so long, it cannot get there (time). 8 s: people who stand in the way go on.
+    #[param(default = Duration::secs(8), min = 0.5, max = 600.0)]
+    pub patience: Duration,
 }
 
 impl FollowerParams {
@@ -106,7 +110,7 @@ impl Agent for PathFollower {
         let (is_new, dt) = (self.duty.is_new(task.as_ref(), now), self.duty.dt(now));
         if is_new {
             // A path to another goal leads elsewhere.
-            self.way.path = None;
+            (self.way.path, self.way.got_on) = (None, None);
         }
         while let Some(path) = self.path.take() {
             if task.is_some() {
@@ -131,9 +135,25 @@ struct Way {
     clearance: Option<Dated<f64>>,
     path: Option<(Track, Path, Sequence<Point, WAYPOINTS>)>,
     last: Twist,
+    /// Where it was last that it got on, by the wheels, and how long ago that is (s).
+    got_on: Option<(Pose, f64)>,
 }
 
+/// A robot that is so far from where it was has got on (m, rad).
+const GOT_ON: (f64, f64) = (0.1, 0.3);
+
 impl Way {
+    /// For how long it has wished to drive and got nowhere (s).
+    fn held(&mut self, odometry: Pose, dt: f64) -> f64 {
+        let (at, since) = self.got_on.unwrap_or((odometry, 0.0));
+        let moved = at.position().distance(odometry.position()) > GOT_ON.0
+            || wrap(odometry.heading - at.heading).abs() > GOT_ON.1;
+        let wishes = self.last != Twist::ZERO;
+        let since = if moved || !wishes { 0.0 } else { since + dt };
+        self.got_on = Some((if moved { odometry } else { at }, since));
+        since
+    }
+
     fn change(&mut self, params: &FollowerParams, path: &Path, task: Option<&Task>) {
         let Some(task) = task else { return };
         if !path.found {
@@ -181,12 +201,15 @@ impl Way {
         let gone = track.step(&points, here, clearance, dt);
         self.path = Some((track, path, points));
         self.last = gone.twist;
+        let odometry = self.place.odometry.map_or(here, |odometry| odometry.pose);
+        let is_held = self.held(odometry, dt) > params.patience.seconds();
         let left = here.position().distance(self.goal(&path, task));
         let progress = match gone.mode {
             // A path that was cut goes on with the next.
             Following::Arrived if path.cut => Progress::Underway,
             Following::Arrived if left > params.goal_near => Progress::Unreachable,
             Following::Arrived => Progress::Arrived,
+            _ if is_held => Progress::Unreachable,
             _ => Progress::Underway,
         };
         (gone.twist, Report { progress, distance: left, ..report })
@@ -240,6 +263,18 @@ mod tests {
         let mut way = Way::default();
         way.change(&params, &Path { cut: true, ..path(&[(0.0, 0.0), (1.0, 0.0)]) }, Some(&task));
         assert_eq!(driven(&mut way, &task).1.progress, Progress::Underway);
+    }
+
+    #[test]
+    fn what_is_held_for_too_long_does_not_get_there() {
+        let (params, task) = (FollowerParams::default(), to(2.0, 0.0));
+        let mut way = Way::default();
+        way.change(&params, &path(&[(0.0, 0.0), (2.0, 0.0)]), Some(&task));
+        way.place.odometry = Some(Odometry::default());
+        let held = |i: i32| way.advance(&params, &task, 0.02 * f64::from(i), 0.02).1.progress;
+        let told: Vec<Progress> = (0..410).map(held).collect();
+        let first = told.iter().position(|progress| *progress == Progress::Unreachable);
+        assert!(first.is_some_and(|first| (395..=405).contains(&first)), "{first:?}");
     }
 
     #[test]

@@ -22,6 +22,8 @@ mod serve;
 mod summary;
 mod tasks;
 mod timing;
+#[cfg(test)]
+mod trouble;
 mod useful;
 
 use std::path::{Path, PathBuf};

@@ -1,0 +1,151 @@
+//! What becomes of a goal when something goes wrong on the way: the scenario `reactive` with other requests.
+
+use std::sync::Arc;
+
+use runtime::TimedRequest;
+use types::Duration;
+use types::messages::Progress;
+
+use super::summary::Summary;
+use super::{ClockChoice, One, Place, RunArgs, options, with_robots};
+use crate::figures::TaskOutcome;
+
+/// Runs the reactive layer for so many seconds with these requests, each at its second.
+fn asked(name: &str, requests: &[(i64, &str)], seconds: i64) -> Summary {
+    #[derive(clap::Parser)]
+    struct Line {
+        #[command(flatten)]
+        run: RunArgs,
+    }
+    let folder = std::env::temp_dir().join(format!("sinew-trouble-{}-{name}", std::process::id()));
+    let line: Line = clap::Parser::parse_from(["run", "reactive"]);
+    let args = RunArgs { limit: Some(Duration::secs(seconds)), ..line.run };
+    let mut scenario = options::scenario(&args, with_robots(agents::registry())).unwrap();
+    let timed = |(at, text): &(i64, &str)| TimedRequest {
+        at: Duration::secs(*at),
+        words: text.split_whitespace().map(str::to_owned).collect(),
+        place: Default::default(),
+    };
+    scenario.file.plan.requests = requests.iter().map(timed).collect();
+    // Its parts are drawn of other times.
+    scenario.file.plan.sections.remove("figure");
+    let ready = scenario.prepare(1).unwrap();
+    let one = One {
+        args: &args,
+        scenario: &scenario,
+        seed: 1,
+        clock: ClockChoice::Sim,
+        watched: false,
+        place: Some(Place::in_folder(folder.clone(), &args).unwrap()),
+        asked_to_end: Arc::default(),
+        serves: false,
+        repeat: None,
+        knowing: None,
+    };
+    let summary = one.run(ready).unwrap();
+    let refused: Vec<_> = summary.incidents.iter().filter(|told| told.what.contains("refused")).collect();
+    assert!(refused.is_empty(), "{refused:?}");
+    std::fs::remove_dir_all(folder).unwrap();
+    summary
+}
+
+fn ended(summary: &Summary, task: u32) -> &TaskOutcome {
+    summary.tasks.iter().find(|known| known.task == task).unwrap_or_else(|| panic!("{:?}", summary.tasks))
+}
+
+fn ends(summary: &Summary, task: u32, expected: Progress) -> &TaskOutcome {
+    let task = ended(summary, task);
+    assert_eq!(task.last.progress, expected, "{task:?}");
+    task
+}
+
+fn nothing_touched(summary: &Summary) {
+    assert_eq!(summary.collisions(), Some(0), "{:?}", summary.tasks);
+}
+
+/// How far the robot went (m).
+fn way(summary: &Summary) -> f64 {
+    summary.robots[0].truth.unwrap().distance
+}
+
+/// A goal to which nothing is in the way.
+const FREE: &str = "call navigation.go x=9.5 y=1.5 mode=goto";
+
+#[test]
+fn slipping_wheels_and_a_push_are_made_good_by_the_localizer() {
+    let slip = "call world.slip robot=r left=0.0 right=0.2 seconds=3";
+    let push = "call world.push robot=r left=-0.4 turn=0.3";
+    for (name, trouble) in [("slip", slip), ("push", push)] {
+        let summary = asked(name, &[(1, FREE), (8, trouble)], 60);
+        let off = ends(&summary, 1, Progress::Arrived).off.unwrap();
+        assert!(off < 0.02, "{name}: {off} m off");
+        nothing_touched(&summary);
+    }
+}
+
+#[test]
+fn a_robot_that_is_carried_elsewhere_finds_itself_and_its_goal() {
+    let carried = "call world.put name=r x=9.5 y=6.5 heading=-2.0";
+    let summary = asked("carried", &[(2, carried), (12, "call navigation.go x=9.5 y=1.5 mode=goto")], 60);
+    let off = ends(&summary, 1, Progress::Arrived).off.unwrap();
+    assert!(off < 0.02, "{off} m off");
+    nothing_touched(&summary);
+}
+
+#[test]
+fn with_a_laser_that_is_off_or_stuck_or_tells_nonsense_it_stands_and_says_that_it_is_lost() {
+    for kind in ["off", "stuck", "garbage"] {
+        let summary = asked(kind, &[(1, FREE), (8, &format!("fault r.scan {kind}"))], 40);
+        let last = ended(&summary, 1).last.progress;
+        assert!(matches!(last, Progress::Lost | Progress::Unreachable), "{kind}: {:?}", summary.tasks);
+        nothing_touched(&summary);
+        // From there on it stands: it is far from its goal.
+        assert!(way(&summary) < 6.0, "{kind}: {} m", way(&summary));
+    }
+}
+
+#[test]
+fn a_goal_inside_an_obstacle_cannot_be_reached_whichever_way_it_goes() {
+    for mode in ["goto", "path", "goto+avoid"] {
+        let go = format!("call navigation.go x=6 y=5.2 seconds=90 mode={mode}");
+        let summary = asked(&format!("inside-{mode}"), &[(1, &go)], 100);
+        let last = ended(&summary, 1).last.progress;
+        assert!(matches!(last, Progress::Unreachable | Progress::TimedOut), "{mode}: {:?}", summary.tasks);
+        nothing_touched(&summary);
+    }
+}
+
+#[test]
+fn a_goal_that_is_walled_in_on_the_way_cannot_be_reached_and_a_wall_beside_the_way_does_not_matter() {
+    let go = "call navigation.go x=10.5 y=6.8 mode=path";
+    let wall = |name: &str, x: f64, y: f64, length: f64, width: f64| {
+        format!("call world.add name={name} x={x} y={y} length={length} width={width}")
+    };
+    // Around the goal on two sides; the walls of the room are the others.
+    let [left, below] = [wall("left", 9.3, 6.75, 0.1, 2.4), wall("below", 10.6, 5.6, 2.7, 0.1)];
+    let summary = asked("walled", &[(1, go), (4, &left), (4, &below)], 200);
+    ends(&summary, 1, Progress::Unreachable);
+    nothing_touched(&summary);
+    let beside = wall("beside", 4.5, 2.2, 0.1, 1.6);
+    let summary = asked("beside", &[(1, go), (4, &beside)], 120);
+    let off = ends(&summary, 1, Progress::Arrived).off.unwrap();
+    assert!(off < 0.05, "{off} m off");
+    nothing_touched(&summary);
+}
+
+#[test]
+fn an_action_that_dies_makes_the_robot_stand_and_a_new_goal_is_reached_when_it_is_back() {
+    let again = "call navigation.go x=9.5 y=1.5 mode=goto";
+    let summary = asked("dies", &[(1, FREE), (6, "fault goto panic"), (12, again)], 60);
+    ends(&summary, 1, Progress::Halted);
+    ends(&summary, 2, Progress::Arrived);
+    nothing_touched(&summary);
+}
+
+#[test]
+fn a_goal_that_makes_no_sense_moves_nothing() {
+    let summary =
+        asked("senseless", &[(1, "call navigation.go x=1e9 y=0"), (2, "call navigation.drive")], 10);
+    assert!(summary.tasks.is_empty(), "{:?}", summary.tasks);
+    assert!(way(&summary) < 1e-6);
+}
