@@ -13,6 +13,7 @@ mod hop;
 mod load;
 mod localize;
 mod machine;
+mod nav;
 mod outcome;
 mod parcel;
 mod peers;
@@ -93,6 +94,12 @@ const BENCHES: &[Bench] = &[
         what: "adding an agent to a live system of 1000 and removing it; up to 10 000 agents at 10 Hz in simulated time",
         goal: "a change in less than 1 ms whatever is wired elsewhere; a step as long among 10 000 as among 1000, and 20 times real time",
         measure: grow::measure,
+    },
+    Bench {
+        name: "nav",
+        what: "steps of the laws of avoidance on a scan of 360 beams, beside a copy of the scan",
+        goal: "30 us a step; told beside it nearness/memcpy, smooth/memcpy",
+        measure: nav::measure,
     },
     Bench {
         name: "watch",

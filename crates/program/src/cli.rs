@@ -99,6 +99,12 @@ pub(crate) struct RunArgs {
     /// The file of a recorded robot, for the scenario "recorded": a CARMEN log, wheel counts, or our own .mcap.
     #[arg(long, value_name = "FILE")]
     pub(crate) from: Option<PathBuf>,
+    /// The worlds of the scenario "barn", one a line; else generated ones.
+    #[arg(long, value_name = "FILE")]
+    pub(crate) worlds: Option<PathBuf>,
+    /// The robot of the scenario "barn".
+    #[arg(long, value_enum)]
+    pub(crate) robot: Option<Shaped>,
     /// The log of a simulated run: runs it again with its seed and all that was asked in it while it went, and says whether the
     /// bytes are the same. Other options are to be those of that run.
     #[arg(long, value_name = "F.mcap", conflicts_with_all = ["seed", "seeds", "from"])]
@@ -133,6 +139,16 @@ pub(crate) enum ClockChoice {
     Wall,
     /// Simulated time.
     Sim,
+}
+
+/// Which outline a robot has.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum)]
+pub(crate) enum Shaped {
+    /// Rectangular: 0.508 m by 0.43 m.
+    #[default]
+    Rectangular,
+    /// Round: 0.68 m across.
+    Round,
 }
 
 /// How fast simulated time goes.

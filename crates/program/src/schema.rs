@@ -428,6 +428,10 @@ fn goal() -> Json {
             ("inside", text("The region in which the robot must be.")),
             ("near", text("The person or thing to which the robot must be near.")),
             ("follows", text("The person that the robot must follow.")),
+            (
+                "moved",
+                json!({"type": "number", "minimum": 0, "description": "How far it must get from where the stage began (m)."}),
+            ),
             ("turned", json!({"type": ["string", "number"], "description": "How far the robot must turn."})),
             ("distance", json!({"type": "number", "minimum": 0, "description": "How near (m)."})),
             ("time", time("For how long in all it must follow.")),

@@ -3,6 +3,7 @@
 // A test says what it skips, and a failed step ends it.
 #![allow(clippy::unwrap_used, clippy::print_stdout)]
 
+mod barn;
 mod busy;
 mod data;
 mod hands;

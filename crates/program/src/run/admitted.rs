@@ -43,6 +43,7 @@ fn what_does_not_fit_is_refused_and_fits_once_others_make_room_as_proposed() {
     let scenario = options::scenario(&args, with_robots(agents::registry())).unwrap();
     std::fs::remove_file(&file).unwrap();
     let one = One {
+        facts: None,
         args: &args,
         scenario: &scenario,
         seed: 1,

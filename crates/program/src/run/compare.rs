@@ -66,6 +66,7 @@ pub(super) fn run(
             serves: false,
             repeat: None,
             knowing: still.as_ref(),
+            facts: None,
         };
         let summary = one.run(ready)?;
         lines.push(row(value, &summary));

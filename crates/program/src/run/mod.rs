@@ -9,6 +9,7 @@
 #[cfg(test)]
 mod admitted;
 mod asked;
+mod barn;
 mod burden;
 mod compare;
 mod judge;
@@ -73,6 +74,9 @@ pub(crate) fn run(args: &RunArgs, registry: Registry, json: bool) -> Result<Exit
     let (scenario, knowing) = knowing::begin(scenario, repeat.as_ref(), terminal::tell)?;
     let scenario = options::only(args, scenario)?;
     let knowing = knowing.as_ref();
+    if barn::is_meant(args)? {
+        return barn::run(args, &scenario, signals.asked_to_end(), json);
+    }
     if let Some(range) = args.seeds {
         return seeds::run(args, &scenario, knowing, range, signals.asked_to_end(), json);
     }
@@ -93,7 +97,19 @@ pub(crate) fn run(args: &RunArgs, registry: Registry, json: bool) -> Result<Exit
     let watched = !json && terminal::watched();
     let place = Place::of(args, name, seed)?;
     let (scenario, serves) = (&scenario, true);
-    let whole = One { args, scenario, seed, clock, watched, place, asked_to_end, serves, repeat, knowing };
+    let whole = One {
+        args,
+        scenario,
+        seed,
+        clock,
+        watched,
+        place,
+        asked_to_end,
+        serves,
+        repeat,
+        knowing,
+        facts: None,
+    };
     let mut summary = whole.run(ready)?;
     if let Some(compared) = compare::asked(args, &whole.scenario.file.plan) {
         summary.compared = compare::run(&whole, &summary, &compared)?;
@@ -167,6 +183,8 @@ struct One<'a> {
     repeat: Option<Repeat>,
     /// What it knows from a store.
     knowing: Option<&'a Knowing>,
+    /// Where the truth goes, where there is no log.
+    facts: Option<Facts>,
 }
 
 impl One<'_> {
@@ -184,7 +202,7 @@ impl One<'_> {
         let said = file::calls::ready(&mut plan, scheduled, &ready.registry);
         let asked = Asked::of(&mut plan, firings.unwrap_or_default(), self.repeat.as_ref());
         let log = self.log(&ready, &asked)?;
-        let facts = log.as_ref().map(|(_, facts, _)| facts.clone());
+        let facts = log.as_ref().map(|(_, facts, _)| facts.clone()).or_else(|| self.facts.clone());
         let judge = judge::Judge::new(&ready, self.asked_to_end.clone(), asked.clone(), facts);
         let judge = judge.paced(self.speed().filter(|_| self.clock == ClockChoice::Sim));
         let judge = judge.patient(self.args.give_up);
@@ -451,6 +469,7 @@ mod tests {
             serves: false,
             repeat: None,
             knowing: None,
+            facts: None,
         };
         one.run(ready).unwrap()
     }

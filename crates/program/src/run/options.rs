@@ -8,15 +8,16 @@ use record::log::Reader;
 use runtime::{Plan, Registry};
 use types::value::Value;
 
-use super::knowing;
 use super::prepare::{Ready, Scenario};
+use super::{barn, knowing};
 use crate::cli::{ClockChoice, RunArgs};
 use crate::error::Failure;
 use crate::{figures, file};
 
 /// Reads the system file, with the changes that the command line makes to its entries.
 pub(super) fn scenario(args: &RunArgs, registry: Registry) -> Result<Scenario, Failure> {
-    let mut loaded = file::load(&args.system, &knowing::sets(args), &registry)?;
+    let sets = [barn::sets(args), knowing::sets(args)].concat();
+    let mut loaded = file::load(&args.system, &sets, &registry)?;
     loaded.store = args.know.clone().or(loaded.store);
     if let Some(from) = &args.from {
         let (driver, folder) = recording(from)?;

@@ -104,7 +104,8 @@ fn one(
     };
     let asked_to_end = asked_to_end.clone();
     let (watched, serves, repeat) = (false, false, None);
-    One { args, scenario, seed, clock, watched, place, asked_to_end, serves, repeat, knowing }.run(ready)
+    One { args, scenario, seed, clock, watched, place, asked_to_end, serves, repeat, knowing, facts: None }
+        .run(ready)
 }
 
 fn text(name: &str, range: Seeds, done: &BTreeMap<u64, Summary>, took: f64) -> String {

@@ -31,6 +31,7 @@ fn asked(name: &str, requests: &[(i64, &str)], seconds: i64) -> Summary {
     scenario.file.plan.sections.remove("figure");
     let ready = scenario.prepare(1).unwrap();
     let one = One {
+        facts: None,
         args: &args,
         scenario: &scenario,
         seed: 1,

@@ -138,6 +138,7 @@ impl Home {
         let place = Place::of(&args, "small", 1).unwrap();
         let ready = scenario.prepare(1).unwrap();
         let one = One {
+            facts: None,
             args: &args,
             scenario,
             seed: 1,
