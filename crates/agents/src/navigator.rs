@@ -6,10 +6,14 @@ use motion::ring::Ring;
 use navigation::avoid::Body;
 use navigation::navigator::{Navigator as Stack, Parameters, Scan};
 use runtime::{Agent, Fault, Input, Output, Step};
-use types::messages::{Doing, Drive, LaserScan, Navigation, Odometry, Offer, Path as Way, Twist, WAYPOINTS};
+use types::messages::{
+    Doing, Drive, LaserScan, Mode, Motion, Navigation, Odometry, Offer, Path as Way, Progress, Report, Task,
+    Twist, WAYPOINTS,
+};
 use types::params::Params;
 use types::{Duration, Point, Pose, Time};
 
+use crate::action::{Duty, NOTHING, Whereabouts};
 use crate::odometry::ODOM;
 
 /// What the robot is, and where it shall go.
@@ -104,8 +108,17 @@ pub struct Navigator {
     odometry: Input<Odometry>,
     /// Where to: the end of the way, in the frame of the odometry. One without points takes the goal away.
     goal: Input<Way>,
+    /// Whether it is heard, as an action beside others. Where it is not wired, it is.
+    mode: Input<Mode>,
+    /// Where to, as an action: it drives while the task is to go to a place.
+    task: Input<Task>,
+    /// Where the robot is on the map, from the localizer: for tasks whose goal is there.
+    pose: Input<Odometry>,
     /// A wish to drive, for a coordinator.
     drive: Output<Offer>,
+    /// How far it has come with its task.
+    #[port(history = 64)]
+    report: Output<Report>,
     /// The same as a plain motion, for a drive without one.
     wish: Output<Twist>,
     /// What it is doing.
@@ -115,6 +128,8 @@ pub struct Navigator {
     #[port(history = 64)]
     path: Output<Way>,
     params: NavigatorParams,
+    duty: Duty,
+    place: Whereabouts,
     helm: Helm,
 }
 
@@ -143,6 +158,16 @@ impl Agent for Navigator {
         if let Some(odometry) = self.odometry.latest() {
             self.helm.moves = Some((odometry.pose, odometry.twist));
         }
+        let is_action = self.task.is_wired();
+        let mut task = None;
+        if is_action {
+            self.duty.listen(&mut self.mode, &mut self.task);
+            self.place.listen(&mut self.odometry, &mut self.pose, step.now);
+            task = self.duty.task(step.name_of(step.agent).unwrap_or_default().as_str());
+            task = task.filter(|task| task.motion == Motion::Goto);
+            let is_new = self.duty.is_new(task.as_ref(), step.now);
+            self.helm.aim(task.and_then(|task| self.place.goal(&task)), is_new);
+        }
         if let Some(scan) = self.scan.newest() {
             let stamp = scan.header().stamp;
             let at = self.odometry.at(stamp).map(|found| found.value().pose);
@@ -150,6 +175,10 @@ impl Agent for Navigator {
         }
         let state = self.helm.step(&self.params, step.now);
         let (twist, now) = (state.twist, step.now);
+        if is_action {
+            let seconds = self.duty.seconds(now);
+            self.report.send(task.map_or(NOTHING, |task| told(&task, &state, seconds)));
+        }
         let drives = !matches!(state.doing, Doing::Idle | Doing::Blind);
         self.drive.send(Offer {
             twist,
@@ -167,6 +196,20 @@ impl Agent for Navigator {
     }
 }
 
+/// What becomes of a task.
+fn told(task: &Task, state: &Navigation, seconds: f64) -> Report {
+    let progress = match state.doing {
+        Doing::Arrived => Progress::Arrived,
+        Doing::GivenUp => Progress::Unreachable,
+        _ if task.seconds > 0.0 && seconds > task.seconds => Progress::TimedOut,
+        _ => Progress::Underway,
+    };
+    Report { task: task.number, progress, distance: state.left, angle: 0.0, seconds }
+}
+
+/// A goal that a correction of the localizer moves by less than this stays where it is (m): another one is begun anew.
+const MOVED: f64 = 0.1;
+
 /// The stack, and what it was told last.
 #[derive(Debug, Default)]
 struct Helm {
@@ -179,6 +222,16 @@ struct Helm {
 }
 
 impl Helm {
+    /// Takes over the goal of a task, by the wheels.
+    fn aim(&mut self, goal: Option<Point>, is_new: bool) {
+        if let (Some(Some(before)), Some(goal), false) = (self.heard, goal, is_new)
+            && before.distance(goal) < MOVED
+        {
+            return;
+        }
+        self.heard = Some(goal);
+    }
+
     /// Takes in a scan that was made at `at`; without it the last pose that was heard counts.
     fn look(&mut self, scan: &LaserScan, row: &[f32], at: Option<Pose>, stamp: Time) {
         let (Some(stack), Some((here, _))) = (&mut self.stack, self.moves) else { return };
@@ -226,6 +279,21 @@ fn seconds(time: Time) -> f64 {
 mod tests {
     use super::*;
     use types::geometry::PI;
+
+    #[test]
+    fn a_goal_that_a_correction_moves_by_a_little_stays_and_another_does_not() {
+        let mut helm = Helm::default();
+        let at = |x| Some(Point::new(x, 1.0));
+        helm.aim(at(3.0), true);
+        helm.aim(at(3.05), false);
+        assert_eq!(helm.heard, Some(at(3.0)));
+        helm.aim(at(3.15), false);
+        assert_eq!(helm.heard, Some(at(3.15)));
+        helm.aim(at(3.2), true);
+        assert_eq!(helm.heard, Some(at(3.2)), "another task");
+        helm.aim(None, false);
+        assert_eq!(helm.heard, Some(None));
+    }
 
     fn params() -> NavigatorParams {
         NavigatorParams { goal_x: 3.0, has_goal: true, ..NavigatorParams::default() }
