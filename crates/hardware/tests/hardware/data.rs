@@ -8,7 +8,7 @@ use types::Time;
 use types::messages::{LaserScan, Odometry, WheelTicks};
 
 /// Where the files are: the folder that `SINEW_DATA` names, else one beside the workspace.
-fn file(name: &str) -> Option<PathBuf> {
+pub(crate) fn file(name: &str) -> Option<PathBuf> {
     let beside = PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../..").join("../shared/data");
     let path = std::env::var_os("SINEW_DATA").map_or(beside, PathBuf::from).join(name);
     if !path.is_file() {

@@ -5,6 +5,7 @@
 
 mod busy;
 mod data;
+mod mapping;
 mod past;
 mod replay;
 mod whole;
