@@ -7,6 +7,7 @@ mod barn;
 mod busy;
 mod data;
 mod hands;
+mod mapping;
 mod past;
 mod replay;
 mod whole;
