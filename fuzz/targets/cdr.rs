@@ -29,6 +29,7 @@ fuzz_target!(|bytes: &[u8]| {
         14 => typed::<Risk>(bytes),
         15 => typed::<Safety>(bytes),
         16 => typed::<Target>(bytes),
+        17 => typed::<Landmarks>(bytes),
         255 => foreign(bytes),
         _ => {}
     }

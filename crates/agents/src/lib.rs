@@ -15,7 +15,12 @@
 //! | [`image_tracker`] | HSI picture, head | the target, wishes for feet and head |
 //! | [`recogniser`] | a picture, head | whether a thing of a colour and shape is there, and where |
 //! | [`path_planner`] | ranges, odometry | a way to a place, and how good it is |
+//! | [`goto`] | a task, odometry, the pose of a localizer | a wish to steer to a point, a pose or a dock |
+//! | [`mover`] | a task, odometry | a wish to drive a distance, an angle, a velocity for a time |
+//! | [`path_follower`] | a task, a path, odometry | a wish to drive along the path |
+//! | [`emergency_stop`] | scan, ranges, how the robot moves | a bound that ramps it down before what it would meet |
 //! | [`navigation`] | goals and manoeuvres of people and programs | tasks, and what becomes of them |
+//! | [`tour`] | places | the wish to go there, one after another |
 //! | [`process_supervisor`] | tasks, who lives | the mode: who is heard, and how |
 //! | [`real_time_supervisor`] | modes, tasks, reports of actions | the same for the real-time side, together; standing when one is silent |
 //! | [`localizer`] | scans, odometry, a floor plan | where the robot is on the floor, or that it is not known |
@@ -28,17 +33,22 @@
 //! Nothing here knows a simulator or a driver: a robot's ports are wired by the names that stand at the agents' ports.
 #![forbid(unsafe_code)]
 
+mod action;
 pub mod camera;
 pub mod coordinator;
 pub mod decision_maker;
 pub mod drive;
+pub mod emergency_stop;
+pub mod goto;
 pub mod head;
 pub mod image_tracker;
 pub mod laser;
 pub mod localizer;
 pub mod lookout;
+pub mod mover;
 pub mod navigation;
 pub mod odometry;
+pub mod path_follower;
 pub mod path_planner;
 pub mod process_supervisor;
 pub mod real_time_supervisor;
@@ -47,6 +57,7 @@ pub mod resource_manager;
 pub mod safety_monitor;
 mod shared;
 pub mod sonar;
+pub mod tour;
 mod trust;
 pub mod wall_follower;
 
@@ -54,13 +65,17 @@ pub use camera::Camera;
 pub use coordinator::Coordinator;
 pub use decision_maker::DecisionMaker;
 pub use drive::DriveBase;
+pub use emergency_stop::EmergencyStopAction;
+pub use goto::GotoAction;
 pub use head::PanTilt;
 pub use image_tracker::ImageTracker;
 pub use laser::Laser;
 pub use localizer::Localizer;
 pub use lookout::Lookout;
+pub use mover::MoveAction;
 pub use navigation::Navigation;
 pub use odometry::DeadReckoning;
+pub use path_follower::PathFollower;
 pub use path_planner::PathPlanner;
 pub use process_supervisor::ProcessSupervisor;
 pub use real_time_supervisor::RealTimeSupervisor;
@@ -68,6 +83,7 @@ pub use recogniser::Recogniser;
 pub use resource_manager::ResourceManager;
 pub use safety_monitor::SafetyMonitor;
 pub use sonar::Sonar;
+pub use tour::Tour;
 pub use wall_follower::WallFollower;
 
 /// All agents of this crate, by their kinds.
@@ -84,7 +100,12 @@ pub fn registry() -> runtime::Registry {
         ImageTracker,
         Recogniser,
         PathPlanner,
+        GotoAction,
+        MoveAction,
+        PathFollower,
+        EmergencyStopAction,
         Navigation,
+        Tour,
         ProcessSupervisor,
         RealTimeSupervisor,
         PanTilt,
@@ -115,7 +136,12 @@ mod tests {
             "image-tracker",
             "recogniser",
             "path-planner",
+            "goto",
+            "move",
+            "path-follower",
+            "emergency-stop",
             "navigation",
+            "tour",
             "process-supervisor",
             "real-time-supervisor",
             "head",

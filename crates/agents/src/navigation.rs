@@ -161,7 +161,7 @@ impl Desk {
             return Err("speed and seconds are positive, or zero for the robot's own");
         }
         let here = self.pose.map_or(Pose::default(), |(pose, _)| pose);
-        if (x - here.x).hypot(y - here.y) > params.farthest {
+        if here.position().distance(types::Point::new(x, y)) > params.farthest {
             return Err("the goal is farther away than the parameter \"farthest\" allows");
         }
         let usual = if dock { params.dock_mode } else { params.goto_mode };

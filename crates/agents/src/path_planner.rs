@@ -2,30 +2,35 @@
 //!
 //! ```text
 //!  ranges ────▶ local map ─▶ ground ─▶ grid around the robot ─▶ field: a first way, then better ones ─▶ path
-//!  odometry ──▶
+//!  odometry ──▶                                  ▲
+//!  task, or the parameters ─▶ goal, by the wheels ┘
 //! ```
+//!
+//! The grid moves with the wheels, so that a correction of the localizer moves no wall; the goal of a task is on the map, and each correction
+//! moves it in the grid.
 //!
 //! The first way is the part of a step that must be done. What follows is taken as long as the runtime allows; it says how good the path is.
 //! Of what nothing is known it takes that one can go there.
 
 use std::any::Any;
 
-use navigation::field::{Cell, Field, Grid, Path as Found, Refined};
 use navigation::ground::{CELL, Ground};
+use navigation::path::{Anytime, Cell, Field, Grid, Path as Found, Refined};
 use perception::local_map::{LocalMap, MapParams};
 use runtime::{Agent, Fault, Input, Output, Step};
 use types::geometry::{PI, whole};
-use types::messages::{Odometry, Path, Ranges};
+use types::messages::{Motion, Odometry, Path, Ranges, Task};
 use types::params::Params;
 use types::{Duration, Point, Pose, Time};
 
+use crate::action::Whereabouts;
 use crate::odometry::ODOM;
 use crate::shared::echoes;
 
 /// Where to, and how much room the robot needs.
 #[derive(Clone, Debug, Params)]
 pub struct PlannerParams {
-    /// Where to, ahead of where the odometry began (m).
+    /// Where to while no task says it, ahead of where the odometry began (m).
     #[param(default = 0.0, min = -1000.0, max = 1000.0)]
     pub goal_x: f64,
     /// Where to, to the left of where the odometry began (m).
@@ -64,13 +69,19 @@ const NEARBY: u32 = 10;
 pub struct PathPlanner {
     /// What is around.
     ranges: Input<Ranges>,
-    /// Where the robot believes to be; the path and its goal are in the same frame. Without it nothing is planned.
+    /// Where the robot believes to be; the path is in the same frame. Without it nothing is planned.
     odometry: Input<Odometry>,
+    /// Where to: it plans while the task is to go along a path. Where it is not wired, the parameters say where to, always.
+    task: Input<Task>,
+    /// Where the robot is on the map, from the localizer: for tasks whose goal is there.
+    pose: Input<Odometry>,
     /// The way, with a bound of how good it is.
     #[port(history = 64)]
     path: Output<Path>,
     params: PlannerParams,
     survey: Survey,
+    place: Whereabouts,
+    asked: Option<Task>,
     plan: Plan,
 }
 
@@ -83,16 +94,22 @@ impl Agent for PathPlanner {
     }
 
     fn step(&mut self, step: &mut Step) -> Result<(), Fault> {
-        if let Some(odometry) = self.odometry.latest() {
+        self.place.listen(&mut self.odometry, &mut self.pose, step.now);
+        if let Some(odometry) = self.place.odometry {
             self.survey.pose = Some(odometry.pose);
         }
+        self.asked = self.task.latest().or(self.asked);
         if let Some(received) = self.ranges.newest() {
             let stamp = received.header().stamp;
             let at = self.odometry.at(stamp).map(|found| found.value().pose);
             self.survey.hear(&self.params, &received, at, stamp);
         }
         let Some(pose) = self.survey.pose else { return Ok(()) };
-        self.plan.begin(&self.params, &self.survey.ground, pose);
+        let own = Point::new(self.params.goal_x, self.params.goal_y);
+        let Some(goal) = goal(self.task.is_wired(), self.asked.as_ref(), own, &self.place) else {
+            return Ok(());
+        };
+        self.plan.begin(&self.params, &self.survey.ground, pose, goal);
         while step.may_refine() {
             if self.plan.field.refine() == Refined::Final {
                 break;
@@ -103,6 +120,18 @@ impl Agent for PathPlanner {
         self.path.send(path);
         Ok(())
     }
+}
+
+/// Where to, in the frame of the wheels; nothing where nobody asks, or nobody knows where that is.
+fn goal(is_asked: bool, task: Option<&Task>, own: Point, place: &Whereabouts) -> Option<Point> {
+    if !is_asked {
+        return Some(own);
+    }
+    let task = task.filter(|task| task.motion == Motion::Path && task.number > 0)?;
+    if task.frame.as_str() == ODOM {
+        return Some(task.target.position());
+    }
+    Some(place.map_from_odometry?.inverse().transform(task.target.position()))
 }
 
 /// What is known of the floor, and where the robot is.
@@ -134,17 +163,19 @@ struct Plan {
     field: Field,
     /// The column and row on the floor of the first cell of the grid.
     corner: (i32, i32),
+    /// Whether the goal lies beyond the grid.
+    beyond: bool,
 }
 
 impl Default for Plan {
     fn default() -> Plan {
-        Plan { grid: Grid::new(SIDE, SIDE), field: Field::new(SIDE, SIDE), corner: (0, 0) }
+        Plan { grid: Grid::new(SIDE, SIDE), field: Field::new(SIDE, SIDE), corner: (0, 0), beyond: false }
     }
 }
 
 impl Plan {
     /// Draws the floor around the robot, and finds a first way.
-    fn begin(&mut self, params: &PlannerParams, ground: &Ground, pose: Pose) {
+    fn begin(&mut self, params: &PlannerParams, ground: &Ground, pose: Pose, goal: Point) {
         let here = pose.position();
         let half = SIDE as i32 / 2;
         self.corner = (whole(here.x / CELL) - half, whole(here.y / CELL) - half);
@@ -152,7 +183,9 @@ impl Plan {
         self.grid.inflate((params.radius + params.room) / CELL);
         let fit = |cell: Cell, grid: &Grid| grid.nearest_open(cell, NEARBY).unwrap_or(cell);
         let start = fit(self.cell(here), &self.grid);
-        let goal = fit(self.cell(Point::new(params.goal_x, params.goal_y)), &self.grid);
+        let cell = self.cell(goal);
+        self.beyond = self.middle(cell).distance(goal) > CELL;
+        let goal = fit(cell, &self.grid);
         // Why there is none stands in the path: it has no points.
         let _ = self.field.begin(&self.grid, start, goal);
     }
@@ -185,6 +218,7 @@ impl Plan {
         let mut path = Path {
             frame: ODOM.into(),
             found: !best.cells().is_empty(),
+            cut: self.beyond,
             length: best.length() * CELL,
             quality: best.quality(),
             ..Path::default()
@@ -221,9 +255,26 @@ mod tests {
     /// The path after all refinements.
     fn path(params: &PlannerParams, survey: &Survey) -> Path {
         let mut plan = Plan::default();
-        plan.begin(params, &survey.ground, Pose::default());
+        plan.begin(params, &survey.ground, Pose::default(), Point::new(params.goal_x, params.goal_y));
         while plan.field.refine() != Refined::Final {}
         plan.path()
+    }
+
+    #[test]
+    fn a_task_says_where_to_on_the_map_and_nobody_plans_without_one() {
+        let own = Point::new(1.0, 2.0);
+        let mut place = Whereabouts::default();
+        assert_eq!(goal(false, None, own, &place), Some(own), "nobody can ask");
+        let target = Pose::new(5.0, 1.0, 0.0);
+        let task = Task { number: 1, motion: Motion::Path, frame: "map".into(), target, ..Task::default() };
+        assert_eq!(goal(true, None, own, &place), None);
+        assert_eq!(goal(true, Some(&Task { motion: Motion::Goto, ..task }), own, &place), None, "straight");
+        assert_eq!(goal(true, Some(&task), own, &place), None, "nobody knows where the map is");
+        place.map_from_odometry = Some(Pose::new(2.0, 1.0, PI));
+        let there = goal(true, Some(&task), own, &place).unwrap();
+        assert!((there.x + 3.0).abs() < 1e-12 && there.y.abs() < 1e-12, "{there:?}");
+        let by_wheels = Task { frame: ODOM.into(), ..task };
+        assert_eq!(goal(true, Some(&by_wheels), own, &place), Some(target.position()));
     }
 
     #[test]
@@ -251,7 +302,7 @@ mod tests {
     fn a_goal_beyond_the_grid_is_neared_and_one_that_is_taken_is_met_beside() {
         let survey = room();
         let far = path(&to(0.0, -90.0), &survey);
-        assert!((far.points.last().unwrap().y + 6.35).abs() < 1e-9, "{far:?}");
+        assert!((far.points.last().unwrap().y + 6.35).abs() < 1e-9 && far.cut, "{far:?}");
         let beside = path(&to(1.2, 0.0), &survey);
         let end = Point::from(*beside.points.last().unwrap());
         assert!(beside.found && end.distance(Point::new(1.2, 0.0)) < 0.5 && end.x < 1.0, "{end:?}");

@@ -38,6 +38,8 @@ pub struct Periods {
     pub head: Option<Duration>,
     /// Poses that came with a recording.
     pub pose: Option<Duration>,
+    /// What sees or hears landmarks; where there is both, the more frequent.
+    pub landmarks: Option<Duration>,
 }
 
 /// How far a head turns and nods.

@@ -3,7 +3,9 @@
 use std::borrow::Cow;
 
 use types::Time;
-use types::messages::{Battery, Bumper, Echoes, Gyro, Head, Image, LaserScan, Odometry, Twist, WheelTicks};
+use types::messages::{
+    Battery, Bumper, Echoes, Gyro, Head, Image, Landmarks, LaserScan, Odometry, Twist, WheelTicks,
+};
 
 use crate::description::RobotDescription;
 use crate::gate::Permit;
@@ -78,6 +80,8 @@ pub struct Listening {
     pub head: bool,
     /// [`Sink::pose`]
     pub pose: bool,
+    /// [`Sink::landmarks`]
+    pub landmarks: bool,
 }
 
 impl Listening {
@@ -92,6 +96,7 @@ impl Listening {
         battery: true,
         head: true,
         pose: true,
+        landmarks: true,
     };
 }
 
@@ -137,6 +142,10 @@ pub trait Sink {
     /// A pose that came with a recording, in the frame [`LOG`](crate::description::LOG).
     fn pose(&mut self, stamp: Time, pose: &Odometry) {
         let _ = (stamp, pose);
+    }
+    /// What is seen or heard of landmarks.
+    fn landmarks(&mut self, stamp: Time, landmarks: &Landmarks) {
+        let _ = (stamp, landmarks);
     }
 }
 

@@ -12,6 +12,7 @@
 //! | stop, age of commands, limits | [`latch`], [`guard`], [`gate`] |
 //! | the agent with the ports of a robot | [`robot`] |
 //! | drivers | [`simulated`], [`recording`] with [`carmen`], [`ticks`] and [`replay`] |
+//! | recordings without a driver: robots among coded landmarks | [`mrclam`] |
 //! | from a word in a file to a driver | [`open`](mod@open) |
 //!
 //! A robot in a simulated hall, for three seconds:
@@ -45,6 +46,7 @@ pub mod guard;
 pub mod host;
 pub mod latch;
 mod lines;
+pub mod mrclam;
 mod newest;
 pub mod open;
 pub mod recording;

@@ -10,7 +10,7 @@ use std::path::{Path, PathBuf};
 
 use record::log::{Clock, Message as Logged, ReadError, Reader};
 use types::messages::{
-    Battery, Bumper, Echoes, Gyro, Head, Image, LaserScan, Odometry, Transforms, Twist, WheelTicks,
+    Battery, Bumper, Echoes, Gyro, Head, Image, Landmarks, LaserScan, Odometry, Transforms, Twist, WheelTicks,
 };
 use types::{Duration, Message, Time, cdr};
 
@@ -48,6 +48,7 @@ enum Port {
     Battery,
     Head,
     Pose,
+    Landmarks,
     Transforms,
 }
 
@@ -64,6 +65,7 @@ fn port_of(topic: &str) -> Option<(&str, Port)> {
         "battery" => Port::Battery,
         "head" => Port::Head,
         "pose" => Port::Pose,
+        "landmarks" => Port::Landmarks,
         "transforms" => Port::Transforms,
         _ => return None,
     };
@@ -109,6 +111,7 @@ fn survey(path: &Path, robot: &str) -> Result<Survey, ReplayError> {
             Port::Battery => &mut periods.battery,
             Port::Head => &mut periods.head,
             Port::Pose => &mut periods.pose,
+            Port::Landmarks => &mut periods.landmarks,
             Port::Transforms => {
                 if decode::<Transforms>(&logged.cdr, &mut mounts).is_ok() {
                     description.mounts.clone_from(&mounts);
@@ -214,6 +217,7 @@ impl Replayed {
             Port::Battery if wanted.battery => sink.battery(stamp, &decode::<Battery>(cdr, none)?),
             Port::Head if wanted.head => sink.head(stamp, &decode::<Head>(cdr, none)?),
             Port::Pose if wanted.pose => sink.pose(stamp, &decode::<Odometry>(cdr, none)?),
+            Port::Landmarks if wanted.landmarks => sink.landmarks(stamp, &decode::<Landmarks>(cdr, none)?),
             Port::Scan if wanted.scan => {
                 let plain = decode::<LaserScan>(cdr, &mut self.ranges)?;
                 let form = self.mounted(plain);

@@ -3,7 +3,8 @@
 //! ```text
 //!              ┌────────────── Robot ──────────────┐
 //!   drive    ─▶│                                   │─▶ sonar scan image ticks bumper gyro battery head
-//!   head_to  ─▶│  commands ─▶ Gate ◀─▶ Driver      │─▶ pose        (a recording's own, in the frame "log")
+//!   head_to  ─▶│  commands ─▶ Gate ◀─▶ Driver      │─▶ landmarks   (seen, or heard by infrared)
+//!              │                                   │─▶ pose        (a recording's own, in the frame "log")
 //!   safety   ─▶│                                   │─▶ transforms  (where the sensors sit)
 //!              └───────────────────────────────────┘
 //! ```
@@ -12,7 +13,8 @@ use std::sync::{Arc, Mutex};
 
 use runtime::{Agent, AgentType, Envelope, Fault, Input, Output, Step};
 use types::messages::{
-    Battery, Bumper, Echoes, Gyro, Head, Image, LaserScan, Odometry, Safety, Transforms, Twist, WheelTicks,
+    Battery, Bumper, Echoes, Gyro, Head, Image, Landmarks, LaserScan, Odometry, Safety, Transforms, Twist,
+    WheelTicks,
 };
 use types::params::Params;
 use types::{Duration, Time};
@@ -117,6 +119,8 @@ pub struct Robot {
     head: Output<Head>,
     /// The poses that came with a recording, in the frame "log"; other robots have none.
     pose: Output<Odometry>,
+    /// What is seen or heard of landmarks.
+    landmarks: Output<Landmarks>,
     /// Where the sensors sit.
     #[port(rows = 64)]
     transforms: Output<Transforms>,
@@ -178,6 +182,7 @@ impl Robot {
             battery: self.battery.has_listeners(),
             head: self.head.has_listeners(),
             pose: self.pose.has_listeners(),
+            landmarks: self.landmarks.has_listeners(),
         }
     }
 
@@ -199,10 +204,11 @@ impl Agent for Robot {
         let wanted = self.listening();
         let policy = self.policy();
         let now = step.now;
-        let Robot { gate, params, sonar, scan, image, ticks, bumper, gyro, battery, head, pose, .. } = self;
+        let Robot { gate, params, sonar, scan, image, ticks, bumper, gyro, battery, head, .. } = self;
+        let (pose, landmarks) = (&mut self.pose, &mut self.landmarks);
         let Some(gate) = gate else { return Ok(()) };
         gate.set_policy(policy, params.bumper_latches);
-        let mut outputs = Outputs { sonar, scan, image, ticks, bumper, gyro, battery, head, pose };
+        let mut outputs = Outputs { sonar, scan, image, ticks, bumper, gyro, battery, head, pose, landmarks };
         let polled = gate.poll(now, &wanted, &mut outputs).map_err(|error| Fault { what: error.what })?;
         if let Some(next) = polled.next {
             step.wake_at(next);
@@ -297,6 +303,7 @@ struct Outputs<'a> {
     battery: &'a mut Output<Battery>,
     head: &'a mut Output<Head>,
     pose: &'a mut Output<Odometry>,
+    landmarks: &'a mut Output<Landmarks>,
 }
 
 /// Every reading carries the time at which it was true.
@@ -331,5 +338,8 @@ impl Sink for Outputs<'_> {
     }
     fn pose(&mut self, stamp: Time, pose: &Odometry) {
         self.pose.send_as(at(stamp), *pose);
+    }
+    fn landmarks(&mut self, stamp: Time, landmarks: &Landmarks) {
+        self.landmarks.send_as(at(stamp), *landmarks);
     }
 }

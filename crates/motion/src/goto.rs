@@ -27,7 +27,7 @@
 //! It holds for steps of 5 to 50 ms and corrections more often than the time to stop at the goal (about 1 s).
 
 use crate::blend::{self, Blend};
-use crate::kinematics::Twist;
+use crate::kinematics::{self, Twist};
 use crate::limits::{Forward, Limits, limit};
 use crate::steering::{self, Mode, Polar, Steering};
 use crate::trajectory::{self, Gains};
@@ -249,8 +249,8 @@ pub struct Goto {
     blend: Blend,
     steering: Steering,
     phase: Phase,
-    /// Whether the standoff is behind it; `true` where there is none.
-    before_dock: bool,
+    /// Whether it has been at the standoff; `true` where there is none.
+    past_standoff: bool,
     attempts: u32,
     progress: Progress,
     last: Twist,
@@ -280,7 +280,7 @@ impl Goto {
             blend: Blend::new(parameters.blend, map_from_odometry, odometry),
             steering,
             phase: if lost { Phase::Lost } else { Phase::Steering },
-            before_dock: !matches!(goal.arrival, Arrival::Dock(_)),
+            past_standoff: !matches!(goal.arrival, Arrival::Dock(_)),
             attempts: 0,
             progress: Progress::NONE,
             last: present,
@@ -289,9 +289,17 @@ impl Goto {
         }
     }
 
-    /// Takes what the localizer found: the pose of odometry's frame on the map. What is not finite is left out, and `false` told.
+    /// Takes what the localizer found: the pose of odometry's frame on the map, of where both had the body at one and the same time; how old
+    /// that is matters little then. What is not finite is left out, and `false` told.
     pub fn correct(&mut self, map_from_odometry: Pose) -> bool {
         self.blend.correct(map_from_odometry)
+    }
+
+    /// Tells that something else drove it since the last step, and that it moves by `present` now (a coordinator chose another, a safety
+    /// monitor held it): the next order goes on from there, and patience begins anew. The time for all runs on.
+    pub fn yielded(&mut self, present: Twist) {
+        self.last = if kinematics::is_finite(present) { present } else { Twist::ZERO };
+        self.progress = Progress::NONE;
     }
 
     /// The next order, for a body that odometry has at `odometry`, `dt` (s) after the one before.
@@ -363,10 +371,10 @@ impl Goto {
         // What has not come in yet would push it off again.
         let settled = far < p.steering.near / 2.0 && turned < p.aligned / 2.0;
         if settled && self.still >= p.still {
-            if self.before_dock {
+            if self.past_standoff {
                 self.end(Phase::Arrived);
             } else {
-                self.before_dock = true;
+                self.past_standoff = true;
                 self.attempts += 1;
                 self.go_on(Phase::Docking);
             }
@@ -404,7 +412,7 @@ impl Goto {
         let docking = self.parameters.docking;
         let at = self.target(pose).inverse().then(pose);
         if -at.x >= docking.standoff {
-            self.before_dock = false;
+            self.past_standoff = false;
             self.go_on(Phase::Aligning);
             return Twist::ZERO;
         }
@@ -419,7 +427,7 @@ impl Goto {
 
     /// Whether it stands in the dock, where it must not be steered out of again.
     fn is_docked(&self) -> bool {
-        self.before_dock && matches!(self.goal.arrival, Arrival::Dock(_))
+        self.past_standoff && matches!(self.goal.arrival, Arrival::Dock(_))
     }
 
     /// Where it goes just now: the goal, or the standoff. Without a heading of its own the goal has that of the way to it.
@@ -427,7 +435,7 @@ impl Goto {
         let point = self.goal.point;
         let heading = self.goal.heading().unwrap_or_else(|| (point - pose.position()).bearing());
         let goal = Pose { x: point.x, y: point.y, heading };
-        if self.before_dock { goal } else { goal.along_arc(-self.parameters.docking.standoff, 0.0) }
+        if self.past_standoff { goal } else { goal.along_arc(-self.parameters.docking.standoff, 0.0) }
     }
 
     fn turn_left(&self, pose: Pose) -> f64 {

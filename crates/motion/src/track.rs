@@ -11,13 +11,14 @@
 //!
 //! The arc of curvature κ through the body, along its heading, meets the point (Coulter, *Implementation of the Pure Pursuit Path Tracking
 //! Algorithm*, CMU-RI-TR-92-01); on a circle it is that circle, whatever L is. Near a straight line an error across decays over the way s
-//! as exp(−s/L) (cos s/L + sin s/L): poles (−1 ± i)/L. A curve is cut by about L²/8r. The speed is regulated by the curvature, by what is
-//! near (d, from the body's edge; the gain g is 1 or less) and by the end (Macenski, Singh, Martín, Ginés, *Regulated pure pursuit for
-//! robot path tracking*, Autonomous Robots 2023).
+//! as exp(−s/L) (cos s/L + sin s/L): poles (−1 ± i)/L. The speed is regulated by the curvature, by what is near (d, from the body's edge;
+//! the gain g is 1 or less) and by the end (Macenski, Singh, Martín, Ginés, *Regulated pure pursuit for robot path tracking*, Autonomous
+//! Robots 2023).
 //!
 //! The way along the path only grows: the nearest point is sought from that of the step before on, as far as one lookahead along the path
-//! or as the lookahead point. So a path may cross itself, or lead back beside itself, farther on than that. The lookahead point is sought from that of the step before, so that it
-//! does not leap between the places where a winding path leaves the circle. Where the path begins behind, the body turns to it in place.
+//! or as the lookahead point. So a path may cross itself, or lead back beside itself, farther on than that. The lookahead point is sought
+//! from that of the step before, so that it does not leap between the places where a winding path leaves the circle. Where the path begins
+//! behind, the body turns to it in place.
 //!
 //! ```text
 //!  ┌─────────┐  ahead  ┌───────────┐  end   ┌─────────┐
@@ -153,6 +154,11 @@ impl Track {
             arrived: false,
             last: present,
         }
+    }
+
+    /// Tells that something else drove it since the last step, and that it moves by `present` now: the next order goes on from there.
+    pub const fn yielded(&mut self, present: Twist) {
+        self.last = present;
     }
 
     /// The next order for a body at `pose`, `dt` (s) after the one before, on a path given in the same frame, with nothing nearer to the

@@ -303,3 +303,6 @@ pub fn drive(parameters: &Parameters, steering: &Steering, speed: f64) -> Twist 
     let turn = fmin(fmax(parameters.turn_gain * steering.error, -parameters.turn_max), parameters.turn_max);
     Twist::new(fmin(speed, steering.speed), turn * parameters.side.sign())
 }
+
+#[cfg(test)]
+mod tests;

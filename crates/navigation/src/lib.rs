@@ -6,7 +6,10 @@
 //! | module | from | to |
 //! |---|---|---|
 //! | [`ground`] | where it is free, where something stands, where the robot has been | the way to the nearest new ground |
-//! | [`field`] | a grid, a start and a goal | a first way at once, then better ones up to the shortest |
+//! | [`path`] | a grid, a start and a goal | the shortest way, or one at once and then better ones; smoothed, with a time table |
+//! | [`calibration`] | measurements of the robot itself | its wheels, and distances by sizes in the picture |
+//! | [`localisation`] | steps of the wheels, sightings of landmarks and robots | where the robot is, was and will be |
+//! | [`mapping`] | poses and scans | a map of what stands where |
 //! | [`floor`] | a plan of walls, or a grid | how far any point is from them, exactly |
 //! | [`matching`] | a scan, a floor, and about where | where the scan was taken, and how sure that is |
 //! | [`drift`] | a motion by the wheels | how far it may be off |
@@ -15,16 +18,19 @@
 //! | [`roam`] | what is around, and the ground | a motion along the walls, through every gap, to where the robot has not been |
 #![forbid(unsafe_code)]
 
+pub mod calibration;
 pub mod drift;
-pub mod field;
 pub mod floor;
 pub mod ground;
 #[cfg(test)]
 mod laboratory;
 mod layer;
 mod linear;
+pub mod localisation;
 pub mod localiser;
+pub mod mapping;
 pub mod matching;
 pub mod monte_carlo;
+pub mod path;
 pub mod roam;
 mod search;

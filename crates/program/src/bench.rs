@@ -11,6 +11,7 @@
 mod grow;
 mod hop;
 mod load;
+mod localize;
 mod machine;
 mod outcome;
 mod parcel;
@@ -44,6 +45,12 @@ pub(crate) struct BenchArgs {
     /// A tenth of the rounds and samples: to see that it works, not to publish.
     #[arg(long)]
     quick: bool,
+    /// The recording to be measured with, a folder or an archive; else one of the folder that SINEW_DATA names.
+    #[arg(long, value_name = "DIR")]
+    data: Option<PathBuf>,
+    /// Draws figures, where the measurement has any, into this folder.
+    #[arg(long, value_name = "DIR")]
+    out: Option<PathBuf>,
 }
 
 /// One measurement.
@@ -93,7 +100,22 @@ const BENCHES: &[Bench] = &[
         goal: "less than 3 % of a processor, and nothing on threads in real time",
         measure: watch::measure,
     },
+    Bench {
+        name: "localize",
+        what: "how far five real robots, that see coded landmarks and each other, are from where they believe to be",
+        goal: "a mean of 0.15 m over the robots, 100 times as fast as it was recorded; a step of the filter in less than 5 us",
+        measure: localize::measure,
+    },
 ];
+
+/// Recordings of real robots, beside the working folder unless `SINEW_DATA` names another one.
+const DATA_BESIDE: &str = "../shared/data";
+
+/// Where recordings are on this machine; nothing where there are none.
+fn data() -> Option<PathBuf> {
+    let folder = std::env::var_os("SINEW_DATA").map_or_else(|| PathBuf::from(DATA_BESIDE), PathBuf::from);
+    folder.is_dir().then_some(folder)
+}
 
 /// How a measurement is to be done.
 pub(super) struct Setting<'a> {
@@ -105,6 +127,10 @@ pub(super) struct Setting<'a> {
     program: Option<PathBuf>,
     /// Of so many rounds or samples one is done.
     shorter: usize,
+    /// The recording that was named.
+    data: Option<PathBuf>,
+    /// Where figures go; nowhere, and none are drawn.
+    out: Option<PathBuf>,
 }
 
 impl Setting<'_> {
@@ -136,6 +162,8 @@ pub(crate) fn bench(args: &BenchArgs, registry: &Registry, json: bool) -> Result
         peers: Peers::find(),
         program: std::env::current_exe().ok(),
         shorter: if args.quick { 10 } else { 1 },
+        data: args.data.clone(),
+        out: args.out.clone(),
     };
     let mut spins = spin::round_trips();
     let mut outcome = (bench.measure)(&setting)?;
@@ -175,7 +203,8 @@ mod tests {
     #[test]
     fn every_bench_gives_figures_and_names_the_ratios_that_want_another_system() {
         let registry = agents::registry();
-        let setting = Setting { registry: &registry, peers: None, program: None, shorter: 1000 };
+        let setting =
+            Setting { registry: &registry, peers: None, program: None, shorter: 1000, data: None, out: None };
         for bench in BENCHES {
             let outcome = (bench.measure)(&setting).unwrap();
             let document = outcome.to_json(bench.name);

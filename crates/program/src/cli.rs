@@ -10,7 +10,7 @@ use runtime::Registry;
 use types::Duration;
 
 use crate::error::Failure;
-use crate::{analyze, bench, know, live, log, run, terminal, tools};
+use crate::{analyze, bench, calibrate, know, live, log, run, terminal, tools};
 
 /// Many agents, one robot, in time: runs systems of agents on robots, in simulation and on recorded data.
 ///
@@ -42,6 +42,9 @@ enum Command {
     Log(log::LogCommand),
     /// What is known from one run to the next: decision tables, facts, patterns, schedules, maps.
     Know(know::KnowArgs),
+    /// Fits what a robot must know of itself to measurements: its wheels, distances in its picture.
+    #[command(subcommand)]
+    Calibrate(calibrate::CalibrateCommand),
     /// Writes a template that builds, runs and has a test.
     #[command(subcommand)]
     New(tools::NewCommand),
@@ -232,11 +235,20 @@ fn done(command: Command, registry: Registry, json: bool) -> Result<ExitCode, Fa
         Command::Schema => Ok(tools::print_schema(&registry)),
         Command::Log(command) => log::log(command, json),
         Command::Know(args) => know::know(&args, json),
+        Command::Calibrate(command) => calibrate::calibrate(&command, json),
         Command::New(command) => tools::make(&command, json),
         Command::Doctor => Ok(tools::examine(json)),
         Command::Burden(args) => run::burden(&args),
         Command::Bench(args) => bench::bench(&args, &registry, json),
     }
+}
+
+/// Does what is typed behind the name of the program.
+#[cfg(test)]
+pub(crate) fn typed(words: &[&str]) -> Result<ExitCode, Failure> {
+    let line = Line::try_parse_from(["sinew"].iter().chain(words));
+    let line = line.map_err(|error| Failure::new(error.to_string()))?;
+    done(line.command, agents::registry(), line.json)
 }
 
 /// Help and versions are answers; everything else is wrong usage.

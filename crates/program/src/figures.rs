@@ -6,12 +6,16 @@ mod trail;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
-use record::figure::{AgentTiming, Map, Periods, Picture, Series, Timing, Trajectory, Velocity, Waypoint};
+use record::figure::{
+    AgentTiming, Band, Event, Map, Periods, Picture, Series, Timing, Trajectory, Velocity, Waypoint,
+};
 use record::log::Reader;
 use runtime::AgentView;
 use types::Point;
+use types::messages::Report;
 
-pub(crate) use scenery::notes;
+use crate::file::Part;
+pub(crate) use scenery::{notes, stands};
 use trail::{Seen, Trail};
 
 /// Dots in an inch of a PNG: what journals ask of line art at this size.
@@ -23,7 +27,7 @@ const WINDOW: f64 = 2.0;
 pub(crate) fn of_log(log: &Path, folder: &Path, timing: Option<Timing>) -> Result<Vec<PathBuf>, String> {
     let mut reader = Reader::open(log).map_err(|error| error.to_string())?;
     let run = reader.run().cloned().unwrap_or_default();
-    let mut trail = Trail::new(&run);
+    let (mut trail, parts) = (Trail::new(&run), scenery::parts(&run.notes));
     while let Some(message) = reader.next_message().map_err(|error| error.to_string())? {
         trail.take(&message);
     }
@@ -42,6 +46,19 @@ pub(crate) fn of_log(log: &Path, folder: &Path, timing: Option<Timing>) -> Resul
         }
         if !seen.scan_points.is_empty() {
             files.write(&file("map"), &map(seen).draw())?;
+        }
+        for part in &parts {
+            let seen = seen.within(part.span);
+            let name = file(&part.name);
+            match part.is_way {
+                true if !seen.way.is_empty() => {
+                    files.write(&name, &within(trajectory(&trail, &seen), part).draw())?;
+                }
+                false if !seen.speed.is_empty() || !seen.commanded.is_empty() => {
+                    files.write(&name, &velocity_within(velocity(&trail, &seen), part).draw())?;
+                }
+                _ => {}
+            }
         }
     }
     if let Some(periods) = periods(&trail) {
@@ -72,6 +89,27 @@ impl Rates {
         let spans = rest.iter().zip(ends).filter(|((_, is), _)| *is);
         spans.map(|((from, _), to)| (*from, to)).collect()
     }
+}
+
+/// A task of the reactive layer, as its reports tell.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) struct TaskOutcome {
+    pub(crate) task: u32,
+    /// When it was over (s).
+    pub(crate) at: f64,
+    pub(crate) last: Report,
+    /// How far the robot truly was from the place then, where the truth is known and the place is one of the map (m).
+    pub(crate) off: Option<f64>,
+}
+
+/// How the tasks of a log ended.
+pub(crate) fn tasks(log: &Path) -> Result<Vec<TaskOutcome>, String> {
+    let mut reader = Reader::open(log).map_err(|error| error.to_string())?;
+    let mut trail = Trail::new(&reader.run().cloned().unwrap_or_default());
+    while let Some(message) = reader.next_message().map_err(|error| error.to_string())? {
+        trail.take(&message);
+    }
+    Ok(trail.tasks)
 }
 
 /// What a log tells of how often agents ran.
@@ -136,6 +174,27 @@ fn trajectory(trail: &Trail, seen: &Seen) -> Trajectory {
         events: trail.events.clone(),
         others: others.collect(),
     }
+}
+
+/// The same with what happened in a part of the run alone.
+fn within(all: Trajectory, part: &Part) -> Trajectory {
+    let (bands, events) = of_part(&all.bands, &all.events, part);
+    let seconds = part.span.1 - part.span.0;
+    // What was seen in the whole run shows the room, not the part.
+    Trajectory { bands, events, points: Vec::new(), outline_every: (seconds / 40.0).ceil() * 2.0, ..all }
+}
+
+fn velocity_within(all: Velocity, part: &Part) -> Velocity {
+    let (bands, events) = of_part(&all.bands, &all.events, part);
+    Velocity { bands, events, ..all }
+}
+
+fn of_part(bands: &[Band], events: &[Event], part: &Part) -> (Vec<Band>, Vec<Event>) {
+    let (from, until) = part.span;
+    let cut = |band: &Band| Band { from: band.from.max(from), to: band.to.min(until), ..band.clone() };
+    let bands = bands.iter().filter(|band| band.to > from && band.from < until).map(cut).collect();
+    let is_part = |event: &&Event| (from..=until).contains(&event.time);
+    (bands, events.iter().filter(is_part).cloned().collect())
 }
 
 /// Every so many of the points, so that they show where things are and leave the rest to be seen.

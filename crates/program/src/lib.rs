@@ -13,9 +13,11 @@
 //! | what is done with logs | `log` |
 //! | what is known from run to run | `know` |
 //! | measurements | `bench` |
+//! | fits to measurements of a robot | `calibrate` |
 
 mod analyze;
 mod bench;
+mod calibrate;
 mod cli;
 pub mod doctor;
 mod error;

@@ -64,7 +64,7 @@ pub(crate) enum LiveCommand {
     Wire(Words),
     /// Cuts a wire, when what is on it has arrived.
     Unwire(Words),
-    /// Sets parameters, or period, deadline, min_gap, cost, method, budget, importance, suspended: sinew set NAME KEY=VALUE…
+    /// Sets parameters, or period, deadline, min_gap, wake_gap, cost, method, budget, importance, suspended: sinew set NAME KEY=VALUE…
     Set(Words),
     /// The emergency stop: all robots stand until "sinew reset".
     Stop(Words),

@@ -33,6 +33,7 @@ pub fn schema(registry: &Registry) -> Json {
         burden_,
         compare_,
         at_,
+        figure_,
     ] = SECTIONS;
     let properties = object([
         (name, json!({"type": "string", "description": "The name of the system."})),
@@ -68,6 +69,10 @@ pub fn schema(registry: &Registry) -> Json {
                 "description": "An entry of the plan with several values, whose runs are shown one above the other."}),
         ),
         (at_, json!({"type": "array", "items": request(), "description": "Timed requests and faults."})),
+        (
+            figure_,
+            json!({"type": "array", "items": figure(), "description": "Parts of the run that are drawn by themselves."}),
+        ),
     ]);
     json!({
         "$schema": "https://json-schema.org/draft/2020-12/schema",
@@ -183,6 +188,12 @@ fn agent(kind: &AgentType) -> Json {
         ),
         ("on", on),
         ("min_gap", time("The least time between two steps that messages make it run.")),
+        (
+            "wake_gap",
+            time(
+                "The least time between two steps that it asks for itself; the analysis counts them where it is said.",
+            ),
+        ),
         (
             "executor",
             open_choice(executors, "The thread it runs on; chosen by the deadline when nothing is said."),
@@ -433,6 +444,20 @@ fn goal() -> Json {
     );
     schema["description"] = json!("What makes a run a success.");
     schema
+}
+
+fn figure() -> Json {
+    let shows = json!({"enum": ["way", "velocity"], "description":
+        "The way on the floor, or speed, turn rate and heading over time."});
+    closed(
+        [
+            ("name", text("The name of its files.")),
+            ("shows", shows),
+            ("from", time("Its first time, counted from the start.")),
+            ("until", time("Its last time.")),
+        ],
+        &["name", "shows", "from", "until"],
+    )
 }
 
 fn request() -> Json {

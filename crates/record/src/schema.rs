@@ -300,6 +300,7 @@ mod tests {
             describe::<messages::Decision>(),
             describe::<messages::Offer>(),
             describe::<messages::WheelTicks>(),
+            describe::<messages::Landmarks>(),
         ];
         for definition in definitions {
             let read = Schema::parse(definition.name, &definition.text());

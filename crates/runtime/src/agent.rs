@@ -148,7 +148,8 @@ impl Step {
         }
     }
 
-    /// Asks for one more step at `time`, besides those that are due anyway.
+    /// Asks for one more step at `time`, besides those that are due anyway. It comes later where the plan declares a least time between such steps
+    /// ([`AgentPlan::wake_gap`](crate::AgentPlan::wake_gap)) and the last one is not so long ago.
     pub fn wake_at(&mut self, time: Time) {
         if let Some(context) = crate::context::current() {
             context.wake_at(time);

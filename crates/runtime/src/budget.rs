@@ -37,7 +37,8 @@ impl core::fmt::Display for Budget {
 
 /// What an agent needs that has an executor under `SCHED_DEADLINE`, or all that is against it.
 ///
-/// One that runs by its period and for messages can have to make a step for each of the two, one after the other.
+/// One that runs by its period and for messages can have to make a step for each of the two, one after the other; and one more where it says how
+/// often it asks for steps itself.
 pub(crate) fn budget_of(plan: &AgentPlan, timing: &Timing) -> Result<Budget, Vec<Refusal>> {
     let name = &plan.name;
     let mut against = Vec::new();
@@ -46,12 +47,11 @@ pub(crate) fn budget_of(plan: &AgentPlan, timing: &Timing) -> Result<Budget, Vec
         let what = format!("messages make {name} run, and under \"deadline\" it needs a least time between");
         against.push(Refusal::new(what).help("write min_gap = \"10ms\", say"));
     }
-    let is_periodic = timing.period > Duration::ZERO;
-    let pace = match (is_periodic, runs_for_messages) {
-        (true, true) => timing.period.min(plan.min_gap),
-        (true, false) => timing.period,
-        (false, _) => plan.min_gap,
-    };
+    // What can make it run, and how often at most.
+    let paces = [timing.period, if runs_for_messages { plan.min_gap } else { Duration::ZERO }, plan.wake_gap];
+    let paces = paces.into_iter().filter(|pace| *pace > Duration::ZERO);
+    let steps = paces.clone().count().max(1) as i64;
+    let pace = paces.min().unwrap_or(Duration::ZERO);
     let (shortest, longest) = PERIODS;
     let is_paced = pace > Duration::ZERO;
     if is_paced && !(shortest..=longest).contains(&pace) {
@@ -65,15 +65,18 @@ pub(crate) fn budget_of(plan: &AgentPlan, timing: &Timing) -> Result<Budget, Vec
             "the deadline of {name} is {deadline}; the kernel gives no less than {LEAST} under \"deadline\""
         )));
     }
-    let steps = if is_periodic && runs_for_messages { 2 } else { 1 };
     let Some(cost) = plan.cost_in_all(&[]) else {
         let what = format!("{name} has no cost, and under \"deadline\" it gets as much time as it says");
         against.push(Refusal::new(what).help("write cost = \"2ms\", say: what a step takes at worst"));
         return Err(against);
     };
     if cost * steps > deadline {
-        let both = if steps == 2 { " for each of a step by its period and one for a message" } else { "" };
-        against.push(Refusal::new(format!("{name} needs {cost}{both}, and has {deadline} for it")));
+        let each = match (steps, plan.wake_gap > Duration::ZERO) {
+            (1, _) => "",
+            (2, false) => " for each of a step by its period and one for a message",
+            _ => " for each of the steps that can come at once",
+        };
+        against.push(Refusal::new(format!("{name} needs {cost}{each}, and has {deadline} for it")));
     }
     if !against.is_empty() {
         return Err(against);
@@ -125,6 +128,12 @@ mod tests {
         assert_eq!(told(&agent(1000, 0, 0, 8000)), "deadline 1220us/8ms/8ms");
         assert_eq!(told(&agent(1000, 20_000, 0, 8000)), "deadline 2440us/8ms/8ms");
         assert_eq!(told(&agent(1, 100, 50, 0)), "deadline 22us/50us/100us");
+        // And when it asks for it, no sooner than every 5 ms.
+        let asks = |agent: AgentPlan| AgentPlan { wake_gap: Duration::millis(5), ..agent };
+        assert_eq!(told(&asks(agent(1000, 20_000, 0, 8000))), "deadline 3660us/5ms/5ms");
+        assert_eq!(told(&asks(agent(1000, 20_000, 0, 0))), "deadline 2440us/5ms/5ms");
+        let all = "arm needs 2ms for each of the steps that can come at once, and has 5ms for it";
+        assert_eq!(told(&asks(agent(2000, 20_000, 0, 8000))), all);
     }
 
     #[test]

@@ -3,6 +3,7 @@
 //! The core is the same on every clock. It knows which agents are due or made ready and in which order they go; whoever owns
 //! it says what time it is.
 
+mod asked;
 mod change;
 mod due;
 mod played;
@@ -40,6 +41,8 @@ pub(crate) struct Timing {
     pub period: Duration,
     pub deadline: Duration,
     pub min_gap: Duration,
+    /// The least time between two steps that it asks for itself; zero where none is declared.
+    pub wake_gap: Duration,
     /// How long a step may last before it is taken for one that does not return.
     pub hang_after: Duration,
     /// What it needs where its executor runs by its deadline; nothing where that is not known.
@@ -63,7 +66,7 @@ pub(crate) struct Seat {
     /// Whether any of its inputs takes messages out of a queue.
     pub serves: bool,
     pub timing: Timing,
-    /// The step that the agent asked for.
+    /// When the step is released that the agent asked for.
     pub alarm: Time,
     /// The step that a message asked for too soon after the last one: when it may be. The next step is that one, whatever for.
     pub put_off: Time,
@@ -78,6 +81,9 @@ pub(crate) struct Seat {
     /// Whether the agent is in a step that does not return. Its ends may be in use there, so nobody touches them; it gets others.
     pub lost: bool,
     pub name: Name,
+    /// When that step was asked for; it is released later where it would be too soon after the last one of these, which was released then.
+    pub wish: Time,
+    pub last_wake: Time,
     /// The agent when all were stopped: it is not run any more.
     pub at_rest: Option<Box<dyn Body>>,
 }
@@ -406,8 +412,8 @@ impl Core {
             }
             let Some(seat) = self.seats.get_mut(slot as usize).and_then(Option::as_mut) else { continue };
             if seat.alarm <= now {
-                release = release.or(Some(seat.alarm));
-                seat.alarm = Time::NEVER;
+                let asked_for = seat.wake();
+                release = release.or(Some(asked_for));
             }
             if seat.put_off <= now {
                 let put_off = core::mem::replace(&mut seat.put_off, Time::NEVER);

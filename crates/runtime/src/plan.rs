@@ -37,7 +37,8 @@ pub enum Policy {
     Fifo,
     /// `SCHED_DEADLINE`: above all priorities, and among its like whoever has the earliest deadline. The kernel takes a thread in only if there is
     /// time left for it, and gives it no more than it asked for: in each period of its agent the declared cost and a fifth more, by the deadline.
-    /// What makes the agent run besides its period and its messages, answers and steps that it asks for itself, has to do with that.
+    /// What makes the agent run besides its period, its messages and the steps that it asks for itself no sooner than it declares has to do with
+    /// that: answers, say.
     ///
     /// The executor has one agent alone, which declares its cost, and where messages make it run a least time between. It has neither priority
     /// nor processors of its own (the kernel takes no such thread), and does not watch the clock in place of sleeping.
@@ -154,6 +155,9 @@ pub struct AgentPlan {
     pub on: Vec<String>,
     /// The least time between two steps that messages make it run.
     pub min_gap: Duration,
+    /// The least time between two steps that it asks for itself ([`Step::wake_at`](crate::Step::wake_at), and the time-outs of its calls): an earlier
+    /// one is put off. Zero where nothing is said; then the analysis does not know of such steps.
+    pub wake_gap: Duration,
     /// The executor; chosen by the deadline when nothing is said.
     pub executor: Option<String>,
     /// What happens when it dies.

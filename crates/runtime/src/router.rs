@@ -580,6 +580,10 @@ pub(crate) fn timing_of(plan: &AgentPlan) -> Result<Timing, Refusal> {
     if let Some(cost) = plan.cost.filter(|cost| *cost < Duration::ZERO) {
         return Err(Refusal::new(format!("the cost of {name} is {cost}; no step gives time back")));
     }
+    if plan.wake_gap < Duration::ZERO {
+        let what = format!("the wake_gap of {name} is {}; no step comes before the last one", plan.wake_gap);
+        return Err(Refusal::new(what).help("write wake_gap = \"50ms\", say"));
+    }
     let usual = plan.period.unwrap_or(DEADLINE_ON);
     let deadline = plan.deadline.unwrap_or(usual);
     if deadline <= Duration::ZERO || plan.period.is_some_and(|period| deadline > period) {
@@ -589,7 +593,8 @@ pub(crate) fn timing_of(plan: &AgentPlan) -> Result<Timing, Refusal> {
     }
     let hang_after = plan.hang_after.unwrap_or((deadline * 4).max(LEAST_HANG));
     let means = Means::PLAIN;
-    let mut timing = Timing { period, deadline, min_gap: plan.min_gap, hang_after, budget: None, means };
+    let AgentPlan { min_gap, wake_gap, .. } = *plan;
+    let mut timing = Timing { period, deadline, min_gap, wake_gap, hang_after, budget: None, means };
     timing.budget = budget_of(plan, &timing).ok();
     Ok(timing)
 }

@@ -38,8 +38,8 @@ pub struct Timetable {
 /// A plan without mistakes as the analysis sees it.
 ///
 /// An agent that calls a service runs once more for each answer, and answers are no more than its other steps: these count twice. Whoever takes
-/// messages out of a queue may have to take all of them. Steps that an agent asks for itself ([`Step::wake_at`](crate::Step::wake_at)) are not
-/// counted: nobody knows beforehand how many there will be.
+/// messages out of a queue may have to take all of them. Steps that an agent asks for itself ([`Step::wake_at`](crate::Step::wake_at)) are
+/// counted where its plan declares a least time between them ([`AgentPlan::wake_gap`]): else nobody knows beforehand how many there will be.
 pub fn timetable(plan: &Plan, registry: &Registry, assumed: &Assumed<'_>) -> Timetable {
     let executors = executors_of(plan);
     // Those by deadline stand above all others, on one level: each is taken to wait for all the rest, which it does at worst, whoever of them
@@ -56,6 +56,8 @@ pub fn timetable(plan: &Plan, registry: &Registry, assumed: &Assumed<'_>) -> Tim
         let mut sources: Vec<Source> =
             agent.period.iter().map(|period| Source::Clock { period: exact(*period) }).collect();
         sources.extend(ways.sources(agent, assumed));
+        let asks = Some(agent.wake_gap).filter(|gap| *gap > Duration::ZERO);
+        sources.extend(asks.map(|gap| Source::Asked { least: exact(gap) }));
         if ways.calls(agent) {
             sources.extend(sources.clone());
         }

@@ -12,6 +12,7 @@ use types::Point;
 
 use crate::colour::Colour;
 use crate::field::Field;
+use crate::hand::{MOST_ADDED, Standing};
 use crate::model::Camera;
 use crate::outline::{Look, UNSEEN};
 use crate::plan::{Person, Thing};
@@ -216,6 +217,8 @@ enum Sprite {
     Thing(usize),
     /// What a person carries, and where.
     Carried(usize, Point),
+    /// What was added to the running world.
+    Added(usize),
 }
 
 /// The memory in which pictures are made. It is kept from one picture to the next, so that no picture asks for more.
@@ -232,7 +235,7 @@ impl Simulator {
     pub fn canvas(&self, id: RobotId) -> Canvas {
         let rows = self.robots[id.index()].model.camera.as_ref().map_or(0, |camera| camera.height as usize);
         // Who carries something is two of them.
-        let sprites = 2 * self.people.len() + self.robots.len() + self.plan.things.len();
+        let sprites = 2 * self.people.len() + self.robots.len() + self.plan.things.len() + MOST_ADDED;
         Canvas {
             background: Vec::with_capacity(rows),
             tile: Vec::with_capacity(TILE * rows),
@@ -337,6 +340,9 @@ impl Simulator {
         sprites.extend(robots.map(|(k, _)| Sprite::Robot(k)));
         let things = self.plan.things.iter().enumerate().filter(|(_, thing)| ahead(thing.at, thing.radius));
         sprites.extend(things.map(|(k, _)| Sprite::Thing(k)));
+        let added = self.added().iter().enumerate().filter_map(|(k, thing)| Some((k, thing.as_ref()?)));
+        let added = added.filter(|(_, thing)| ahead(thing.pose.position(), thing.shape.reach()));
+        sprites.extend(added.map(|(k, _)| Sprite::Added(k)));
     }
 }
 
@@ -462,6 +468,11 @@ impl Sprite {
                 person(&walker.plan, walker.at, walker.facing, eye, ray, column);
             }
             Sprite::Robot(k) => machine(&world.robots[k], eye, ray, column),
+            Sprite::Added(k) => {
+                if let Some(thing) = world.added.get(k) {
+                    plain(thing, eye, ray, column);
+                }
+            }
             Sprite::Thing(k) => ball(&world.plan.things[k], world.plan.things[k].at, eye, ray, column),
             Sprite::Carried(k, at) => {
                 if let Some(thing) = &world.people[k].plan.carries {
@@ -512,17 +523,31 @@ fn person(plan: &Person, at: Point, facing: f64, eye: Point, ray: Point, column:
 
 const SKIN: Colour = Colour([206, 164, 122]);
 
+/// A plain box or cylinder.
+fn plain(thing: &Standing, eye: Point, ray: Point, column: &mut Column) {
+    if let Some((t, far, shade)) = trunk(thing.shape.solid(thing.pose), eye, ray) {
+        column.level(t, far, thing.height, thing.colour);
+        column.upright(t, 0.0, thing.height, thing.colour, shade);
+    }
+}
+
+/// Where a ray enters and leaves an upright body, and how the side is lit by which it enters.
+fn trunk(solid: Solid, eye: Point, ray: Point) -> Option<(f64, f64, f64)> {
+    match solid {
+        Solid::Round(circle) => cylinder(circle, eye, ray),
+        Solid::Square(rectangle) => {
+            let (near, far, normal) = rectangle.through(eye, ray)?;
+            Some((near, far, face_shade(normal, eye + ray * near).0))
+        }
+    }
+}
+
 /// Another robot: a body with a dark base and a dark ring of sensors, and a head.
 fn machine(robot: &Robot, eye: Point, ray: Point, column: &mut Column) {
     let (at, tall) = (robot.truth.pose.position(), robot.model.height);
     let dark = Colour([48, 50, 54]);
-    let trunk = match robot.model.shape.solid(robot.truth.pose) {
-        Solid::Round(circle) => cylinder(circle, eye, ray),
-        Solid::Square(rectangle) => rectangle
-            .through(eye, ray)
-            .map(|(near, far, normal)| (near, far, face_shade(normal, eye + ray * near).0)),
-    };
-    if let Some((t, far, shade)) = trunk {
+    let body = robot.model.shape.solid(robot.truth.pose);
+    if let Some((t, far, shade)) = trunk(body, eye, ray) {
         let trunk = 0.62 * tall;
         column.level(t, far, trunk, robot.model.colour);
         column.upright(t, 0.02, 0.1 * tall, dark, shade);

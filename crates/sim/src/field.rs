@@ -45,6 +45,8 @@ pub(crate) struct Post {
 pub(crate) struct Body {
     pub solid: Solid,
     pub high: f64,
+    /// Whether it is somebody who walks by himself.
+    pub person: bool,
     /// A body that is hidden touches nothing and is seen by nothing.
     pub present: bool,
 }
@@ -71,6 +73,8 @@ pub(crate) struct Near {
     pub distance: f64,
     /// The nearest point of its surface.
     pub point: Point,
+    /// Whose it is, when it is that of a body.
+    pub body: Option<u32>,
 }
 
 /// Of `count` cells in a row the one at `offset` (m) from its begin, or the one nearest to there.
@@ -142,7 +146,8 @@ pub(crate) struct Field {
     /// Upright edges, with the span of heights in which they stand: they scatter sound to all sides.
     pub edges: Vec<(Point, f64, f64)>,
     pub bodies: Vec<Body>,
-    blocks: Vec<Block>,
+    /// The cells of each body; none of one that is nowhere.
+    blocks: Vec<Option<Block>>,
 }
 
 impl Field {
@@ -272,16 +277,21 @@ impl Field {
 
     /// Adds a body and gives its number.
     pub(crate) fn add_body(&mut self, body: Body) -> u32 {
+        let id = self.add_hidden();
+        self.bodies[id as usize] = body;
+        self.place_body(id, body.solid);
+        id
+    }
+
+    /// Adds a body that is nowhere until it is placed, and gives its number.
+    pub(crate) fn add_hidden(&mut self) -> u32 {
         let id = self.bodies.len() as u32;
-        let (min, max) = body.solid.bounds();
-        let block = self.block(min, max);
-        self.bodies.push(body);
-        self.blocks.push(block);
-        if self.bodies.len() <= CROWD {
-            // A body that comes into a cell later finds its place there, without new memory.
-            self.bodies_in.iter_mut().for_each(|bodies| bodies.reserve(id as usize + 1));
-        }
-        self.enter(id, block);
+        let solid = Solid::Round(Circle { centre: Point::new(0.0, 0.0), radius: 0.0 });
+        self.bodies.push(Body { solid, high: 0.0, person: false, present: false });
+        self.blocks.push(None);
+        // A body that comes into a cell later finds its place there, without new memory.
+        let room = self.bodies.len().min(CROWD);
+        self.bodies_in.iter_mut().for_each(|bodies| bodies.reserve(room.saturating_sub(bodies.len())));
         id
     }
 
@@ -291,18 +301,28 @@ impl Field {
         self.bodies[index].solid = solid;
         let (min, max) = solid.bounds();
         let block = self.block(min, max);
-        let old = self.blocks[index];
-        if block == old {
+        if self.blocks[index] == Some(block) {
             return;
         }
+        self.leave(id);
+        self.blocks[index] = Some(block);
+        self.enter(id, block);
+    }
+
+    /// Takes a body away: it is nowhere until it is placed again.
+    pub(crate) fn hide_body(&mut self, id: u32) {
+        self.leave(id);
+        self.bodies[id as usize].present = false;
+    }
+
+    fn leave(&mut self, id: u32) {
+        let Some(old) = self.blocks[id as usize].take() else { return };
         for cell in self.cells(old) {
             self.bodies_in[cell].retain(|&other| other != id);
             if self.bodies_in[cell].is_empty() {
                 self.flags[cell] &= !HAS_BODY;
             }
         }
-        self.blocks[index] = block;
-        self.enter(id, block);
     }
 
     fn enter(&mut self, id: u32, block: Block) {
@@ -443,10 +463,10 @@ impl Field {
     pub(crate) fn nearest(&self, centre: Point, limit: f64, height: f64, skip: u32) -> Option<Near> {
         let mut best: Option<Near> = None;
         let mut reach = limit;
-        let mut offer = |point: Point, distance: f64| {
+        let mut offer = |point: Point, distance: f64, body: Option<u32>| {
             if distance < reach {
                 reach = distance;
-                best = Some(Near { distance, point });
+                best = Some(Near { distance, point, body });
             }
         };
         for cell in self.cells(self.block_around(centre, limit)) {
@@ -457,14 +477,14 @@ impl Field {
                     if face.low < height {
                         let point = face.segment.nearest(centre);
                         let away = point - centre;
-                        offer(point, sqrt(away.dot(away)));
+                        offer(point, sqrt(away.dot(away)), None);
                     }
                 }
                 for &index in self.posts_of(cell) {
                     let post = &self.posts[index as usize];
                     if post.low < height {
                         let (distance, point) = post.circle.gap(centre);
-                        offer(point, distance);
+                        offer(point, distance, None);
                     }
                 }
             }
@@ -473,7 +493,7 @@ impl Field {
                     let body = &self.bodies[index as usize];
                     if index != skip && body.present {
                         let (distance, point) = body.solid.gap_to_point(centre);
-                        offer(point, distance);
+                        offer(point, distance, Some(index));
                     }
                 }
             }
@@ -495,10 +515,10 @@ impl Field {
     fn nearest_to(&self, this: &Rectangle, limit: f64, height: f64, skip: u32) -> Option<Near> {
         let mut best: Option<Near> = None;
         let mut reach = limit;
-        let mut offer = |(distance, point): (f64, Point)| {
+        let mut offer = |(distance, point): (f64, Point), body: Option<u32>| {
             if distance < reach {
                 reach = distance;
-                best = Some(Near { distance, point });
+                best = Some(Near { distance, point, body });
             }
         };
         let (min, max) = Solid::Square(*this).bounds();
@@ -507,22 +527,19 @@ impl Field {
             let flags = self.flags[cell];
             if flags & HAS_STATIC != 0 {
                 let faces = self.faces_of(cell).iter().map(|&index| &self.faces[index as usize]);
-                faces
-                    .filter(|face| face.low < height)
-                    .for_each(|face| offer(this.gap_to_segment(&face.segment)));
+                for face in faces.filter(|face| face.low < height) {
+                    offer(this.gap_to_segment(&face.segment), None);
+                }
                 let posts = self.posts_of(cell).iter().map(|&index| &self.posts[index as usize]);
-                posts
-                    .filter(|post| post.low < height)
-                    .for_each(|post| offer(this.gap_to_circle(post.circle)));
+                for post in posts.filter(|post| post.low < height) {
+                    offer(this.gap_to_circle(post.circle), None);
+                }
             }
             if flags & HAS_BODY != 0 {
                 for &index in self.bodies_in[cell].iter().filter(|&&index| index != skip) {
                     let body = &self.bodies[index as usize];
                     if body.present {
-                        offer(match &body.solid {
-                            Solid::Round(circle) => this.gap_to_circle(*circle),
-                            Solid::Square(other) => this.gap_to_rectangle(other),
-                        });
+                        offer(Solid::Square(*this).gap_to(&body.solid), Some(index));
                     }
                 }
             }
@@ -593,7 +610,7 @@ mod tests {
         for k in 0..20 {
             let draw = stream.sample(1000 + k);
             let solid = Solid::Round(Circle { centre: Point::new(0.0, 0.0), radius: 0.3 });
-            let id = field.add_body(Body { solid, high: 1.7, present: k % 7 != 0 });
+            let id = field.add_body(Body { solid, high: 1.7, person: false, present: k % 7 != 0 });
             let centre = Point::new(draw.between(0, -6.0, 6.0), draw.between(1, -6.0, 6.0));
             let solid = if k % 3 == 0 {
                 let pose = types::Pose::new(centre.x, centre.y, draw.between(2, 0.0, TAU));

@@ -32,7 +32,7 @@ pub struct Stage {
 pub enum Condition {
     /// Its middle is inside the region.
     Inside(String),
-    /// Its middle is nearer than this to the middle of a person or thing (m).
+    /// Its middle is nearer than this to the middle of a person, thing or landmark (m).
     Near(String, f64),
     /// Since the stage began its heading has turned by this much in all, to either side (rad).
     Turned(f64),
@@ -281,7 +281,9 @@ fn read_stage(table: &Table, at: Span, world: &WorldPlan, mistakes: &mut Vec<Mis
         }
         if let Some(word) = near {
             let carried = people.filter_map(|person| person.carries.as_ref()).chain(&world.things);
-            let all = names.into_iter().chain(carried.map(|thing| thing.name.as_str())).collect();
+            let landmarks = world.landmarks.iter().map(|landmark| landmark.name.as_str());
+            let all =
+                names.into_iter().chain(carried.map(|thing| thing.name.as_str())).chain(landmarks).collect();
             check(&mut reader, "near", "person or thing", word, all);
             conditions.push(Condition::Near(word.to_owned(), distance));
         }

@@ -5,8 +5,9 @@
 //! | what a world file says | [`plan`] |
 //! | what of a world a plan of the building shows | [`building`] |
 //! | what a robot is made of | [`model`] |
-//! | the running world | [`simulator`], with `robot` (motion, contacts) and `people` (scripts) |
-//! | sensors | `sonar`, [`laser`], [`camera`]; all are methods of [`Simulator`] |
+//! | the running world | [`simulator`], with `robot` (motion, contacts), `people` (scripts) and `crowd` |
+//! | what a hand does to it meanwhile | [`hand`] |
+//! | sensors | `sonar`, [`laser`], [`camera`], [`landmarks`]; all are methods of [`Simulator`] |
 //! | what makes a run a success | [`goal`] |
 //! | what a seed changes | [`vary`], with [`free_way`] |
 //! | plain data to draw | [`snapshot`] |
@@ -18,9 +19,12 @@
 pub mod building;
 pub mod camera;
 pub mod colour;
+mod crowd;
 mod field;
 pub mod free_way;
 pub mod goal;
+pub mod hand;
+pub mod landmarks;
 pub mod laser;
 pub mod model;
 mod outline;

@@ -40,6 +40,13 @@ pub(crate) fn raise(plan: &WorldPlan) -> (Field, Vec<Look>) {
         let look = raised.look(Look { colour: item.colour, top: item.colour, body: 0, skirting: false });
         raised.post(item.at, item.radius, 0.0, item.height, look);
     }
+    for tube in plan.landmarks.iter().filter(|landmark| landmark.radius > 0.0) {
+        let middle = tube.height / 2.0;
+        for (colour, low, high) in [(tube.colour, 0.0, middle), (tube.top, middle, tube.height)] {
+            let look = raised.look(Look { colour, top: colour, body: 0, skirting: false });
+            raised.post(tube.at, tube.radius, low, high, look);
+        }
+    }
     for thing in &plan.things {
         // A ball is drawn as a ball; to rays it is as wide as its middle over its whole height.
         let (low, high) = ((thing.height - thing.radius).max(0.0), thing.height + thing.radius);

@@ -3,6 +3,7 @@
 use types::geometry::{PI, Pose};
 use types::{Duration, Point, Time};
 
+use crate::crowd::Roaming;
 use crate::field::Field;
 use crate::model::Shape;
 use crate::plan::{Person, Region, WorldPlan};
@@ -27,15 +28,19 @@ pub(crate) struct Walker {
     pub present: bool,
     /// Whether the person walked in the last step.
     pub walking: bool,
+    /// The robot that the person came up to in the last step until the two touched, and where.
+    pub touched: Option<(usize, Point)>,
     appears: Option<Region>,
     whens: Vec<Option<Region>>,
     leg: usize,
+    /// How somebody walks about who follows no script.
+    pub roaming: Option<Roaming>,
     /// When the present leg begins; not yet known while its trigger has not come.
     begins: Option<Time>,
 }
 
 impl Walker {
-    pub(crate) fn new(plan: &Person, body: u32, world: &WorldPlan) -> Walker {
+    pub(crate) fn new(plan: &Person, body: u32, world: &WorldPlan, seed: u64) -> Walker {
         let region = |name: &Option<String>| name.as_deref().and_then(|name| world.region(name)).cloned();
         Walker {
             body,
@@ -43,9 +48,11 @@ impl Walker {
             facing: plan.facing,
             present: plan.appears.is_none(),
             walking: false,
+            touched: None,
             appears: region(&plan.appears),
             whens: plan.walk.iter().map(|leg| region(&leg.when)).collect(),
             leg: 0,
+            roaming: Roaming::new(plan, world, seed),
             begins: None,
             plan: plan.clone(),
         }
@@ -58,7 +65,7 @@ impl Walker {
 
     /// Whether the person can ever do anything but stand.
     pub(crate) fn acts(&self) -> bool {
-        !self.present || !self.plan.walk.is_empty() || self.plan.gap.is_some()
+        !self.present || !self.plan.walk.is_empty() || self.plan.gap.is_some() || self.roaming.is_some()
     }
 
     /// Where the middle of a carried thing is (m).
@@ -79,6 +86,9 @@ impl Walker {
         if !self.present {
             return self.appear(robots, field);
         }
+        if self.roaming.is_some() {
+            return self.roam(robots, field);
+        }
         if !self.ready(now, robots) {
             return 0.0;
         }
@@ -97,6 +107,7 @@ impl Walker {
         }
         self.present = true;
         field.bodies[self.body as usize].present = true;
+        field.place_body(self.body, self.solid());
         f64::INFINITY
     }
 
@@ -157,7 +168,7 @@ impl Walker {
     }
 
     /// Whether no robot would be too near at `next`, or the step at least leads away from it.
-    fn free(&self, next: Point, robots: &[Robot]) -> bool {
+    pub(crate) fn free(&self, next: Point, robots: &[Robot]) -> bool {
         robots.iter().all(|robot| match robot.model.shape {
             Shape::Round { radius } => {
                 let centre = robot.truth.pose.position();

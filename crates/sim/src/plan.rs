@@ -31,8 +31,12 @@ pub struct WorldPlan {
     pub rounds: Vec<Round>,
     /// People.
     pub people: Vec<Person>,
+    /// Crowds of people who walk about.
+    pub crowds: Vec<Crowd>,
     /// Coloured things that stand by themselves.
     pub things: Vec<Thing>,
+    /// What sensors can tell from everything else.
+    pub landmarks: Vec<Landmark>,
     /// Named parts of the floor.
     pub regions: Vec<Region>,
 }
@@ -118,6 +122,32 @@ pub struct Thing {
     pub colour: Colour,
 }
 
+/// An upright tube in two colours that sensors can tell from everything else, and whose infrared transmitters tell who it is.
+///
+/// There are four transmitters, a quarter turn apart; each sends its own code, so whoever hears one knows the landmark and the
+/// side from which it hears.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Landmark {
+    /// Its name.
+    pub name: String,
+    /// Its number, from 1.
+    pub id: u32,
+    /// Its middle (m).
+    pub at: Point,
+    /// Where its first side looks (rad).
+    pub facing: f64,
+    /// Its radius (m); 0 is a mark without a body, such as one on a wall.
+    pub radius: f64,
+    /// Its height (m).
+    pub height: f64,
+    /// Colour of its lower half.
+    pub colour: Colour,
+    /// Colour of its upper half.
+    pub top: Colour,
+    /// Whether it has transmitters.
+    pub infrared: bool,
+}
+
 /// A person, who stands or follows a script.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Person {
@@ -149,6 +179,32 @@ pub struct Person {
     pub repeat: bool,
     /// Whether scattering may move the person.
     pub movable: bool,
+    /// Walks about for ever, instead of a script.
+    pub roams: Option<Roam>,
+}
+
+/// How a person walks about: from one place of an area to another, as chance has it, around what stands in the way.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Roam {
+    /// The region in which the places lie.
+    pub area: String,
+    /// Whether the person stops or steps aside before a robot. One who does not walks on until the two touch, and then around.
+    pub yields: bool,
+}
+
+/// People who walk about an area. Who they are, where they begin and where they go comes from the seed.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Crowd {
+    /// How many they are; fewer where there is no room for all.
+    pub count: u32,
+    /// The region in which they walk.
+    pub area: String,
+    /// The share of those who give way to a robot, 0 to 1.
+    pub yields: f64,
+    /// The slowest and the fastest (m/s).
+    pub speed: (f64, f64),
+    /// Radius of each (m).
+    pub radius: f64,
 }
 
 /// One leg of a person's walk.
@@ -186,7 +242,9 @@ impl Default for WorldPlan {
             boxes: Vec::new(),
             rounds: Vec::new(),
             people: Vec::new(),
+            crowds: Vec::new(),
             things: Vec::new(),
+            landmarks: Vec::new(),
             regions: Vec::new(),
         }
     }
@@ -242,6 +300,23 @@ impl Default for Wall {
     }
 }
 
+impl Default for Landmark {
+    /// A tube of 10 cm, red below and green above, as high as a camera.
+    fn default() -> Landmark {
+        Landmark {
+            name: String::new(),
+            id: 1,
+            at: Point::default(),
+            facing: 0.0,
+            radius: 0.05,
+            height: 1.1,
+            colour: Colour([205, 22, 30]),
+            top: Colour([40, 150, 60]),
+            infrared: true,
+        }
+    }
+}
+
 impl Default for Person {
     /// Somebody of average build in a blue shirt who stands still.
     fn default() -> Person {
@@ -260,7 +335,15 @@ impl Default for Person {
             walk: Vec::new(),
             repeat: false,
             movable: false,
+            roams: None,
         }
+    }
+}
+
+impl Default for Crowd {
+    /// Twelve people between a stroll and a fast walk, of whom every other one gives way.
+    fn default() -> Crowd {
+        Crowd { count: 12, area: String::new(), yields: 0.5, speed: (0.5, 1.5), radius: 0.25 }
     }
 }
 

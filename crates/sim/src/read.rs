@@ -7,7 +7,7 @@ use types::value::{Entry, Mistake, Span, Table, TableReader, Value};
 use types::{Duration, Point};
 
 use crate::colour::{Colour, NAMES};
-use crate::plan::{Cuboid, Door, Leg, Person, Region, Round, Thing, Wall, WorldPlan};
+use crate::plan::{Crowd, Cuboid, Door, Landmark, Leg, Person, Region, Round, Thing, Wall, WorldPlan};
 use crate::shape;
 
 /// Coordinates beyond this are mistakes (m).
@@ -45,11 +45,15 @@ impl WorldPlan {
         plan.boxes = r.each("box", read_box);
         plan.rounds = r.each("round", read_round);
         plan.things = r.each("thing", |r| read_thing(r, true));
+        let mut next = 0;
+        plan.landmarks = r.each("landmark", |r| read_landmark(r, &mut next));
         let regions: Vec<&str> = plan.regions.iter().map(|region| region.name.as_str()).collect();
         plan.people = r.each("person", |r| read_person(r, &regions));
+        plan.crowds = r.each("people", |r| read_crowd(r, &regions));
         r.finish();
         check_names(table, "regions", &["region"], mistakes);
-        check_names(table, "people or things", &["person", "thing"], mistakes);
+        check_names(table, "people or things", &["person", "thing", "landmark"], mistakes);
+        check_ids(table, &plan.landmarks, mistakes);
         check_area(table, &plan, mistakes);
         (mistakes.len() == before).then_some(plan)
     }
@@ -326,6 +330,29 @@ fn read_thing(r: &mut Reader<'_, '_>, stands: bool) -> Thing {
     item
 }
 
+/// A landmark without a number has the one after that of the landmark before it.
+fn read_landmark(r: &mut Reader<'_, '_>, last: &mut u32) -> Landmark {
+    let mut item = Landmark { id: last.saturating_add(1), ..Landmark::default() };
+    r.text("name", &mut item.name);
+    match r.inner.int("id") {
+        None => {}
+        Some(id) if (1..=1_000_000).contains(&id) => item.id = id as u32,
+        Some(id) => {
+            let at = r.inner.place("id");
+            r.inner.report(Mistake::new(at, format!("\"id\" is {id}, it must lie from 1 to 1000000")));
+        }
+    }
+    *last = item.id;
+    r.wanted_point("at", &mut item.at);
+    r.angle("facing", &mut item.facing);
+    r.number("radius", 0.0, 2.0, &mut item.radius);
+    r.number("height", 0.02, 10.0, &mut item.height);
+    r.colour("colour", &mut item.colour);
+    r.colour("top", &mut item.top);
+    r.truth("infrared", &mut item.infrared);
+    item
+}
+
 fn read_person(r: &mut Reader<'_, '_>, regions: &[&str]) -> Person {
     let mut person = Person::default();
     r.text("name", &mut person.name);
@@ -347,6 +374,33 @@ fn read_person(r: &mut Reader<'_, '_>, regions: &[&str]) -> Person {
     }
     person.walk = r.each("walk", |r| read_leg(r, regions));
     person
+}
+
+fn read_crowd(r: &mut Reader<'_, '_>, regions: &[&str]) -> Crowd {
+    let mut crowd = Crowd::default();
+    match r.inner.int("count") {
+        None => {}
+        Some(count) if (1..=200).contains(&count) => crowd.count = count as u32,
+        Some(count) => {
+            let at = r.inner.place("count");
+            r.inner.report(Mistake::new(at, format!("\"count\" is {count}, it must lie from 1 to 200")));
+        }
+    }
+    match read_when(r, "area", regions) {
+        Some(area) => crowd.area = area,
+        None => r.inner.missing("area", "the region in which they walk"),
+    }
+    r.number("yields", 0.0, 1.0, &mut crowd.yields);
+    r.number("radius", 0.05, 0.5, &mut crowd.radius);
+    if let Some([slow, fast]) = r.inner.floats::<2>("speed") {
+        if 0.01 <= slow && slow <= fast && fast <= 5.0 {
+            crowd.speed = (slow, fast);
+        } else {
+            let at = r.inner.place("speed");
+            r.inner.report(Mistake::new(at, "\"speed\" is the slowest and the fastest, from 0.01 to 5 m/s"));
+        }
+    }
+    crowd
 }
 
 fn read_leg(r: &mut Reader<'_, '_>, regions: &[&str]) -> Leg {
@@ -383,6 +437,16 @@ fn check_names(table: &Table, kind: &str, lists: &[&str], mistakes: &mut Vec<Mis
     }
 }
 
+/// No two landmarks may share a number.
+fn check_ids(table: &Table, landmarks: &[Landmark], mistakes: &mut Vec<Mistake>) {
+    let mut taken = BTreeSet::new();
+    for (landmark, (_, at)) in landmarks.iter().zip(tables(table, "landmark")) {
+        if !taken.insert(landmark.id) {
+            mistakes.push(Mistake::new(at, format!("two landmarks have the number {}", landmark.id)));
+        }
+    }
+}
+
 /// What stands must not cover more than the grids have room for; said once, at what goes too far.
 fn check_area(table: &Table, plan: &WorldPlan, mistakes: &mut Vec<Mistake>) {
     let (mut min, mut max) =
@@ -391,8 +455,12 @@ fn check_area(table: &Table, plan: &WorldPlan, mistakes: &mut Vec<Mistake>) {
     let boxes = plan.boxes.iter().map(|item| (vec![item.at], item.size.norm() / 2.0));
     let rounds = plan.rounds.iter().map(|item| (vec![item.at], item.radius));
     let things = plan.things.iter().map(|item| (vec![item.at], item.radius));
-    let places = ["wall", "box", "round", "thing"].into_iter().flat_map(|list| tables(table, list));
-    for ((points, reach), (_, at)) in walls.chain(boxes).chain(rounds).chain(things).zip(places) {
+    let landmarks = plan.landmarks.iter().map(|item| (vec![item.at], item.radius));
+    let places =
+        ["wall", "box", "round", "thing", "landmark"].into_iter().flat_map(|list| tables(table, list));
+    for ((points, reach), (_, at)) in
+        walls.chain(boxes).chain(rounds).chain(things).chain(landmarks).zip(places)
+    {
         for point in points {
             min = Point::new(min.x.min(point.x - reach), min.y.min(point.y - reach));
             max = Point::new(max.x.max(point.x + reach), max.y.max(point.y + reach));

@@ -4,7 +4,7 @@ use libm::{exp, fabs, floor, sqrt};
 use types::geometry::{PI, Pose, TAU, wrap};
 use types::{Point, Time};
 
-use crate::field::Field;
+use crate::field::{Field, Near};
 use crate::model::{Battery, Head, Model, Shape};
 use crate::sonar::Fan;
 use types::chance::Stream;
@@ -17,6 +17,11 @@ pub const CLEARANCE_LIMIT: f64 = 2.0;
 const TOUCH: f64 = 1e-6;
 /// A robot in touch that finds itself blocked after this part of its arc is pushing.
 const PUSHING: f64 = 1e-4;
+/// Slower than this towards a person a robot does not drive into that person (m/s).
+const TOWARDS: f64 = 1e-3;
+/// Somebody who comes up to a robot that drives away touches it in step after step: that is one touch, as long as no more steps
+/// than these lie between (half a second).
+const NUDGE: u32 = 50;
 /// A touch ends when the clearance exceeds this (m).
 const RELEASE: f64 = 1e-3;
 /// Along an arc that turns corners the next look is at most this far on where something is near (m).
@@ -32,8 +37,13 @@ const LOOK_AHEAD: f64 = 0.25;
 pub struct Truth {
     /// Where it is.
     pub pose: Pose,
-    /// How often it began to touch something.
+    /// How often it began to touch something by its own doing.
+    ///
+    /// A touch that begins is another's doing where a person is touched and the robot does not move towards that person (it
+    /// stands, leaves or turns away), or where a hand pushed the robot. All other touches are the robot's own.
     pub collisions: u32,
+    /// How often it began to touch something by another's doing: a person walked into it, or it was pushed.
+    pub bumped: u32,
     /// The smallest distance of its outline to anything so far (m); at most [`CLEARANCE_LIMIT`].
     pub closest: f64,
     /// Length of its way so far (m).
@@ -82,6 +92,8 @@ pub(crate) struct Streams {
     pub laser: Stream,
     pub gyro: Stream,
     pub camera: Stream,
+    pub landmarks: Stream,
+    pub infrared: Stream,
     slip: Stream,
 }
 
@@ -128,7 +140,12 @@ pub(crate) struct Robot {
     /// How much of a wheel's speed error is left after one step.
     decay: f64,
     used: f64,
+    /// The share of its way that each wheel loses, and until when.
+    lost: [f64; 2],
+    lost_until: Time,
     touching: bool,
+    /// For so many steps more whoever comes up to the robot again goes on with the same touch.
+    nudged: u32,
     /// Nothing is nearer to the rim than this (m); shrinks with every motion until the robot looks again.
     reach: f64,
     motion: Motion,
@@ -142,11 +159,14 @@ impl Robot {
             laser: stream("laser"),
             gyro: stream("gyro"),
             camera: stream("camera"),
+            landmarks: stream("landmarks"),
+            infrared: stream("infrared"),
             slip: stream("slip"),
         };
         let truth = Truth {
             pose,
             collisions: 0,
+            bumped: 0,
             closest: CLEARANCE_LIMIT,
             distance: 0.0,
             turned: 0.0,
@@ -170,7 +190,10 @@ impl Robot {
             command_until: Time::ZERO,
             decay: if model.drive.lag > 0.0 { exp(-STEP / model.drive.lag) } else { 0.0 },
             used: 0.0,
+            lost: [0.0; 2],
+            lost_until: Time::ZERO,
             touching: false,
+            nudged: 0,
             reach: 0.0,
             motion: Motion::default(),
             model,
@@ -218,6 +241,10 @@ impl Robot {
             left += a * drive.slip * sqrt(fabs(left));
             right += b * drive.slip * sqrt(fabs(right));
         }
+        if now < self.lost_until {
+            left *= 1.0 - self.lost[0];
+            right *= 1.0 - self.lost[1];
+        }
         let turn = (right - left) / (drive.axle * drive.axle_scale);
         self.motion = Motion { distance: (left + right) / 2.0, turn, wheels };
         self.used += self.model.battery.idle * STEP + self.model.battery.drive * fabs(self.motion.distance);
@@ -260,6 +287,7 @@ impl Robot {
         }
         self.truth.linear = distance * part / STEP;
         self.truth.angular = turn * part / STEP;
+        self.nudged = self.nudged.saturating_sub(1);
         if moved {
             self.truth.distance += fabs(distance) * part;
             self.truth.turned += turn * part;
@@ -305,14 +333,87 @@ impl Robot {
         self.truth.closest = self.truth.closest.min(clearance);
         self.reach = clearance.min(limit);
         if clearance <= TOUCH {
-            self.truth.collisions += u32::from(!self.touching);
+            if let Some(near) = &near {
+                self.touch(field, near);
+            }
             self.touching = true;
             self.contact = near.map(|near| near.point);
-        } else if clearance > RELEASE {
+        } else if clearance > RELEASE && self.nudged < NUDGE {
             self.touching = false;
             self.contact = None;
         }
         part
+    }
+
+    /// Somebody came up to the robot until the two touched.
+    pub(crate) fn is_touched(&mut self, field: &Field, body: u32, point: Point) {
+        let near = Near { distance: 0.0, point, body: Some(body) };
+        self.touch(field, &near);
+        (self.touching, self.contact, self.reach, self.nudged) = (true, Some(point), 0.0, NUDGE);
+        self.truth.closest = 0.0;
+    }
+
+    /// Counts a touch, where it begins.
+    fn touch(&mut self, field: &Field, near: &Near) {
+        let person = near.body.is_some_and(|index| field.bodies[index as usize].person);
+        if self.touching || (person && self.nudged > 0) {
+            return;
+        }
+        let own = self.drives_into(field, near);
+        *if own { &mut self.truth.collisions } else { &mut self.truth.bumped } += 1;
+    }
+
+    /// Whether a touch that begins is the robot's own doing: see [`Truth::collisions`].
+    fn drives_into(&self, field: &Field, near: &Near) -> bool {
+        let Some(body) = near.body.map(|index| &field.bodies[index as usize]).filter(|body| body.person)
+        else {
+            return true;
+        };
+        let Pose { heading, .. } = self.truth.pose;
+        let lever = near.point - self.truth.pose.position();
+        // How the point of the robot that is touched moves in this step.
+        let Motion { distance, turn, .. } = self.motion;
+        let moves = Point::polar(distance, heading) + Point::new(-lever.y, lever.x) * turn;
+        let (low, high) = body.solid.bounds();
+        let towards = (low + high) * 0.5 - near.point;
+        moves.dot(towards) > TOWARDS * STEP * towards.norm()
+    }
+
+    /// Pushes the robot by this much (m, in the world) and turns it (rad), up to the first contact; its wheels count nothing of
+    /// it. Gives the part of the way that was free.
+    pub(crate) fn push(&mut self, field: &mut Field, by: Point, turn: f64) -> f64 {
+        let (start, shape) = (self.truth.pose, self.model.shape);
+        let at = |part: f64| {
+            Pose::new(start.x + by.x * part, start.y + by.y * part, wrap(start.heading + turn * part))
+        };
+        let look = |part: f64| {
+            let near = field.clearance(&shape.solid(at(part)), FEEL, self.model.height, self.body);
+            (near.map_or(FEEL, |near| near.distance), near)
+        };
+        let blocked = first_blocked(by.norm() + fabs(turn) * shape.reach(), |part| look(part).0);
+        let mut part = 1.0;
+        if let Some((mut free, mut blocked)) = blocked {
+            for _ in 0..30 {
+                let middle = (free + blocked) / 2.0;
+                if look(middle).0 < 0.0 { blocked = middle } else { free = middle }
+            }
+            part = free;
+            let (clearance, near) = look(part);
+            self.truth.closest = self.truth.closest.min(clearance.max(0.0));
+            self.truth.bumped += u32::from(!self.touching);
+            self.touching = true;
+            self.contact = near.map(|near| near.point);
+        }
+        self.truth.pose = at(part);
+        self.truth.turned += turn * part;
+        self.reach = 0.0;
+        field.place_body(self.body, shape.solid(self.truth.pose));
+        part
+    }
+
+    /// Until then each wheel loses this share of its way, which its encoder counts.
+    pub(crate) fn lose_grip(&mut self, shares: [f64; 2], until: Time) {
+        (self.lost, self.lost_until) = (shares, until);
     }
 
     /// Something appeared or was put elsewhere: look again.

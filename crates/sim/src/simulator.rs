@@ -4,6 +4,7 @@ use types::geometry::{Pose, wrap};
 use types::{Duration, Point, Time};
 
 use crate::field::{Body, Field};
+use crate::hand::Added;
 use crate::model::Model;
 use crate::outline::{self, Look};
 use crate::people::Walker;
@@ -66,7 +67,8 @@ pub struct Simulator {
     pub(crate) robots: Vec<Robot>,
     pub(crate) people: Vec<Walker>,
     pub(crate) noise: crate::camera::NoiseTable,
-    seed: u64,
+    pub(crate) added: Added,
+    pub(crate) seed: u64,
     steps: u64,
 }
 
@@ -74,23 +76,26 @@ impl Simulator {
     /// The world of `plan` at time zero, without robots.
     pub fn new(plan: &WorldPlan, seed: u64) -> Simulator {
         let (mut field, looks) = outline::raise(plan);
+        let plan = crate::crowd::peopled(plan, &field, seed);
         let people = plan
             .people
             .iter()
             .map(|person| {
                 let solid = Solid::Round(Circle { centre: person.at, radius: person.radius });
-                let body =
-                    field.add_body(Body { solid, high: person.height, present: person.appears.is_none() });
-                Walker::new(person, body, plan)
+                let present = person.appears.is_none();
+                let body = field.add_body(Body { solid, high: person.height, person: true, present });
+                Walker::new(person, body, &plan, seed)
             })
             .collect();
+        let added = Added::new(&mut field);
         Simulator {
-            plan: plan.clone(),
+            plan,
             field,
             looks,
             robots: Vec::new(),
             people,
             noise: crate::camera::NoiseTable::new(seed),
+            added,
             seed,
             steps: 0,
         }
@@ -109,8 +114,11 @@ impl Simulator {
         }
         let pose = Pose { heading: wrap(pose.heading), ..pose };
         let solid = model.shape.solid(pose);
+        for walker in &mut self.people {
+            walker.make_room(&solid, &mut self.field);
+        }
         self.check_free(&solid, pose, model.height, u32::MAX)?;
-        let body = self.field.add_body(Body { solid, high: model.height, present: true });
+        let body = self.field.add_body(Body { solid, high: model.height, person: false, present: true });
         self.robots.push(Robot::new(name, model, body, pose, self.seed));
         self.robots.iter_mut().for_each(Robot::look_again);
         Ok(RobotId(self.robots.len() as u32 - 1))
@@ -136,7 +144,7 @@ impl Simulator {
         &self.robots[id.index()].model
     }
 
-    /// The plan of the world.
+    /// The plan of the world, with all people of its crowds.
     pub fn plan(&self) -> &WorldPlan {
         &self.plan
     }
@@ -159,7 +167,13 @@ impl Simulator {
     }
 
     /// Whether nothing stands where a body of this height would.
-    fn check_free(&self, solid: &Solid, pose: Pose, height: f64, skip: u32) -> Result<(), AddError> {
+    pub(crate) fn check_free(
+        &self,
+        solid: &Solid,
+        pose: Pose,
+        height: f64,
+        skip: u32,
+    ) -> Result<(), AddError> {
         match self.field.clearance(solid, 0.0, height, skip) {
             Some(near) => Err(AddError::NotFree(near.point.distance(pose.position()))),
             None => Ok(()),
@@ -191,6 +205,9 @@ impl Simulator {
         for walker in &mut self.people {
             if walker.acts() {
                 drift = drift.max(walker.step(now, &self.robots, &mut self.field));
+                if let Some((robot, point)) = walker.touched.take() {
+                    self.robots[robot].is_touched(&self.field, walker.body, point);
+                }
             }
         }
         for robot in &mut self.robots {
@@ -282,12 +299,15 @@ impl Simulator {
         self.robots[id.index()].head
     }
 
-    /// Where a person or thing of this name is (m), and its radius (m); nothing while it is hidden or when there is none.
+    /// Where a person, thing or landmark of this name is (m), and its radius (m); nothing while it is hidden or when there is none.
     ///
     /// A thing that a person carries is found by its own name.
     pub fn locate(&self, name: &str) -> Option<(Point, f64)> {
         if let Some(thing) = self.plan.things.iter().find(|thing| thing.name == name) {
             return Some((thing.at, thing.radius));
+        }
+        if let Some(landmark) = self.plan.landmarks.iter().find(|landmark| landmark.name == name) {
+            return Some((landmark.at, landmark.radius));
         }
         self.people.iter().filter(|walker| walker.present).find_map(|walker| {
             if walker.plan.name == name {

@@ -3,6 +3,7 @@
 use types::{Point, Pose, Time};
 
 use crate::colour::Colour;
+use crate::hand::Standing;
 use crate::model::Shape;
 use crate::plan::Region;
 use crate::simulator::Simulator;
@@ -81,6 +82,8 @@ pub struct Snapshot {
     pub people: Vec<PersonMark>,
     /// Coloured things, carried ones among them.
     pub things: Vec<Disc>,
+    /// What was added to the running world.
+    pub added: Vec<Standing>,
     /// Robots.
     pub robots: Vec<RobotMark>,
 }
@@ -126,6 +129,7 @@ impl Simulator {
                 .chain(carried)
                 .map(|(thing, centre)| Disc { centre, radius: thing.radius, colour: thing.colour })
                 .collect(),
+            added: self.added().iter().flatten().copied().collect(),
             robots: self
                 .robots
                 .iter()

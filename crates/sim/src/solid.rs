@@ -220,6 +220,22 @@ impl Solid {
         }
     }
 
+    /// How far another is from it (m), negative where they overlap, and the point of the other nearest to it.
+    pub(crate) fn gap_to(&self, other: &Solid) -> Gap {
+        match (self, other) {
+            (Solid::Round(this), Solid::Round(other)) => {
+                let (distance, point) = other.gap(this.centre);
+                (distance - this.radius, point)
+            }
+            (Solid::Round(this), Solid::Square(other)) => {
+                let (distance, point) = other.gap_to_point(this.centre);
+                (distance - this.radius, point)
+            }
+            (Solid::Square(this), Solid::Round(other)) => this.gap_to_circle(*other),
+            (Solid::Square(this), Solid::Square(other)) => this.gap_to_rectangle(other),
+        }
+    }
+
     /// How far a point is from it (m), negative inside, and the point of its border nearest to the point.
     #[inline]
     pub(crate) fn gap_to_point(&self, point: Point) -> Gap {

@@ -11,7 +11,10 @@ use types::{Duration, Point, Pose, Time};
 
 mod body;
 mod common;
+mod crowd;
+mod hand;
 mod home;
+mod landmarks;
 
 const LABORATORY: &str = include_str!("../../../worlds/laboratory.toml");
 const ANNEX: &str = include_str!("../../../worlds/annex.toml");

@@ -53,7 +53,7 @@ pub const CHANGES: [Usage; 13] = [
     usage(
         "set",
         "set NAME KEY=VALUE…",
-        "sets parameters, or the period, deadline, min_gap, cost, method, budget, importance or suspended=true",
+        "sets parameters, or the period, deadline, min_gap, wake_gap, cost, method, budget, importance or suspended=true",
     ),
     usage("fault", "fault AGENT|OUTPUT KIND", "makes an agent or an output misbehave; \"ok\" ends it"),
     usage("send", "send PORT cdr=HEX", "sends a message out of a port"),

@@ -118,6 +118,7 @@ fn read_add(words: &[String]) -> Read<AgentPlan> {
     plan.deadline = pairs.span("deadline")?;
     plan.hang_after = pairs.span("hang_after")?;
     plan.min_gap = pairs.span("min_gap")?.unwrap_or_default();
+    plan.wake_gap = pairs.span("wake_gap")?.unwrap_or_default();
     read_means(&mut pairs, &mut plan)?;
     if let Some(inputs) = pairs.take("on") {
         plan.on = inputs

@@ -11,7 +11,7 @@ use types::{Category, Duration, Priority};
 use super::*;
 
 /// The keys of `add` that are no parameters of the agent.
-const AGENT_KEYS: [&str; 20] = [
+const AGENT_KEYS: [&str; 21] = [
     "methods",
     "method",
     "refinement",
@@ -29,6 +29,7 @@ const AGENT_KEYS: [&str; 20] = [
     "deadline",
     "on",
     "min_gap",
+    "wake_gap",
     "executor",
     "on_death",
     "hang_after",
@@ -199,14 +200,15 @@ prop_compose! {
     fn agent()(
         (name, kind, robot, executor) in (name(), name(), option::of(name()), option::of(name())),
         (period, period_range) in (option::of(span()), option::of((span(), span()))),
-        (cost, deadline, hang_after, min_gap) in (option::of(span()), option::of(span()), option::of(span()), span()),
+        (cost, deadline, hang_after) in (option::of(span()), option::of(span()), option::of(span())),
+        (min_gap, wake_gap) in (span(), span()),
         (on, leaves, params) in (vec(name(), 0..3), any::<bool>(), params()),
         (methods, method, refinement, budget) in
             (vec((name(), span()), 0..3), option::of(name()), option::of(span()), option::of(span())),
         giving in giving(),
     ) -> AgentPlan {
         let on_death = if leaves { OnDeath::Leave } else { OnDeath::Restart };
-        AgentPlan { name, kind, robot, executor, period, period_range, cost, deadline, hang_after, min_gap, on, on_death, params, methods, method, refinement, budget, giving, ..AgentPlan::default() }
+        AgentPlan { name, kind, robot, executor, period, period_range, cost, deadline, hang_after, min_gap, wake_gap, on, on_death, params, methods, method, refinement, budget, giving, ..AgentPlan::default() }
     }
 }
 

@@ -74,6 +74,7 @@ fn add(plan: &AgentPlan) -> Vec<String> {
     push(&mut out, "deadline", plan.deadline);
     push(&mut out, "hang_after", plan.hang_after);
     push(&mut out, "min_gap", (plan.min_gap != Duration::ZERO).then_some(plan.min_gap));
+    push(&mut out, "wake_gap", (plan.wake_gap != Duration::ZERO).then_some(plan.wake_gap));
     let methods = plan.methods.iter().map(|(name, cost)| format!("{name}:{cost}"));
     push(&mut out, "methods", (!plan.methods.is_empty()).then(|| methods.collect::<Vec<_>>().join(",")));
     push(&mut out, "method", plan.method.as_ref());

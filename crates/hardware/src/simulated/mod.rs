@@ -7,7 +7,7 @@
 //!
 //! What the judge knows leaves through [`Truth`] alone; no output of a robot carries it.
 
-mod hand;
+mod hands;
 mod truth;
 mod world;
 
@@ -18,16 +18,16 @@ use motion::limits::Limits;
 use sim::camera::Canvas;
 use sim::{Goal, Model, RobotId, WorldPlan};
 use types::messages::{
-    Battery, Bumper, Echo, Echoes, Encoding, Gyro, Head, Image, LaserScan, Twist, WheelTicks,
+    Battery, Bumper, Echo, Echoes, Encoding, Gyro, Head, Image, Landmarks, LaserScan, Twist, WheelTicks,
 };
 use types::{Duration, Name, Pose, Time};
 
-pub use hand::Hand;
+pub use hands::{Hands, SERVICES, World as WorldAgent, services};
 pub use truth::{PersonMoment, RobotMoment, Truth};
 use world::World;
 
 use crate::cadence::Cadence;
-use crate::description::{CAMERA, ClockKind, HeadLimits, LASER, Periods, RobotDescription};
+use crate::description::{BASE, CAMERA, ClockKind, HeadLimits, LASER, Periods, RobotDescription};
 use crate::driver::{Driver, DriverError, Listening, Polled, Sink};
 use crate::gate::Permit;
 
@@ -102,6 +102,10 @@ pub fn describe(model: &Model) -> RobotDescription {
         battery: Some(model.battery.period),
         head: Some(model.head.period),
         pose: None,
+        landmarks: [model.landmarks.map(|it| it.period), model.infrared.map(|it| it.period)]
+            .into_iter()
+            .flatten()
+            .min(),
     };
     if let Some(laser) = &model.laser {
         description.mount(LASER, laser.mount(), laser.height);
@@ -150,6 +154,8 @@ struct Cadences {
     gyro: Cadence,
     battery: Cadence,
     head: Cadence,
+    landmarks: Cadence,
+    infrared: Cadence,
 }
 
 /// The driver of a simulated robot.
@@ -185,6 +191,8 @@ impl Simulated {
                 gyro: Cadence::every(periods.gyro),
                 battery: Cadence::every(periods.battery),
                 head: Cadence::every(periods.head),
+                landmarks: Cadence::every(model.landmarks.map(|sensor| sensor.period)),
+                infrared: Cadence::every(model.infrared.map(|sensor| sensor.period)),
             },
             description,
             echoes: empty_ring(model),
@@ -199,6 +207,13 @@ impl Simulated {
             },
             pressed: 0,
         }
+    }
+}
+
+impl Simulated {
+    /// A way to change the world of this robot while it runs.
+    pub fn hands(&self) -> Hands {
+        Hands(self.world.clone())
     }
 }
 
@@ -245,8 +260,7 @@ fn empty_image(model: &Model) -> Image {
     }
 }
 
-/// Only drivers of the same world take this lock, and drivers live on the gates' thread: no ordinary thread can hold it. (A [`Hand`] does, in
-/// simulated time.)
+/// Only drivers of the same world take this lock, and drivers live on the gates' thread: no ordinary thread can hold it.
 fn locked(world: &Mutex<World>) -> MutexGuard<'_, World> {
     // The world of a robot whose step panicked goes on for the others.
     world.lock().unwrap_or_else(PoisonError::into_inner)
@@ -296,6 +310,12 @@ impl Driver for Simulated {
                 *head = form;
                 sim.scan(id, sample, ranges)
             });
+        }
+        if let Some(sample) = due.landmarks.due(time).filter(|_| wanted.landmarks) {
+            sink.landmarks(stamp, &Landmarks { frame: Name::new(BASE), seen: sim.landmarks(id, sample) });
+        }
+        if let Some(sample) = due.infrared.due(time).filter(|_| wanted.landmarks) {
+            sink.landmarks(stamp, &Landmarks { frame: Name::new(BASE), seen: sim.infrared(id, sample) });
         }
         if let Some(sample) = due.image.due(time).filter(|_| wanted.image) {
             let (form, canvas) = (self.image, &mut self.canvas);

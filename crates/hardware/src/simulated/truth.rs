@@ -2,6 +2,7 @@
 
 use std::sync::Arc;
 
+use sim::hand::{MOST_ADDED, Standing};
 use sim::snapshot::{Disc, PersonMark, RobotMark, Scenery, Snapshot};
 use sim::{Goal, HeadState, Progress, Simulator, WorldPlan};
 use types::{Duration, Point, Time};
@@ -42,6 +43,7 @@ pub(super) struct Moment {
     slipped: Duration,
     robots: Vec<RobotMoment>,
     people: Vec<PersonMoment>,
+    added: [Option<Standing>; MOST_ADDED],
 }
 
 impl Moment {
@@ -63,6 +65,7 @@ impl Moment {
             slipped: Duration::ZERO,
             robots: simulator.robots().zip(robots).map(robot).collect(),
             people: people.collect(),
+            added: *simulator.added(),
         };
         moment.take_people(simulator);
         moment
@@ -77,6 +80,7 @@ impl Moment {
     ) {
         self.time = simulator.time();
         self.slipped = slipped;
+        self.added = *simulator.added();
         for (id, robot) in simulator.robots().zip(&mut self.robots) {
             *robot = RobotMoment {
                 truth: simulator.truth(id),
@@ -188,6 +192,11 @@ impl Truth {
         progress.map_or_else(Vec::new, |progress| progress.passed().to_vec())
     }
 
+    /// What was added to the running world and stands there now.
+    pub fn added(&self) -> Vec<Standing> {
+        self.newest.read(|moment| moment.added.iter().flatten().copied().collect())
+    }
+
     /// What stands still, to draw.
     pub fn scenery(&self) -> &Scenery {
         &self.fixed.scenery
@@ -218,6 +227,7 @@ impl Truth {
                 .chain(carried)
                 .map(|(thing, centre)| Disc { centre, radius: thing.radius, colour: thing.colour })
                 .collect(),
+            added: moment.added.iter().flatten().copied().collect(),
             robots: self
                 .fixed
                 .robots

@@ -1,9 +1,8 @@
 //! The world that several drivers share.
 
 use sim::camera::Canvas;
-use sim::simulator::AddError;
 use sim::{Goal, PHYSICS_STEP, Progress, RobotId, Simulator, WorldPlan};
-use types::{Duration, Pose, Time};
+use types::{Duration, Time};
 
 use super::truth::{Moment, Truth, truth};
 use super::{Robot, SetupError};
@@ -63,6 +62,13 @@ impl World {
         &self.simulator
     }
 
+    /// Has the world changed from outside, and tells of it at once.
+    pub(super) fn change<T>(&mut self, deed: impl FnOnce(&mut Simulator) -> T) -> T {
+        let done = deed(&mut self.simulator);
+        self.publish();
+        done
+    }
+
     /// Steps the world to the caller's time, never beyond it. Gives the caller's time of the state that it is in then.
     pub(super) fn advance(&mut self, now: Time) -> Time {
         let origin = *self.origin.get_or_insert(now);
@@ -108,12 +114,6 @@ impl World {
         self.simulator.command_wheels(id, left, right);
     }
 
-    pub(super) fn put(&mut self, id: RobotId, pose: Pose) -> Result<(), AddError> {
-        self.simulator.put(id, pose)?;
-        self.publish();
-        Ok(())
-    }
-
     pub(super) fn command_head(&mut self, id: RobotId, pan: f64, tilt: f64) {
         self.simulator.command_head(id, pan, tilt);
     }
@@ -129,6 +129,7 @@ impl World {
 #[cfg(test)]
 mod tests {
     use sim::Model;
+    use types::Pose;
 
     use super::*;
 

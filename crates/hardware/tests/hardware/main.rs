@@ -5,6 +5,7 @@
 
 mod busy;
 mod data;
+mod hands;
 mod past;
 mod replay;
 mod whole;

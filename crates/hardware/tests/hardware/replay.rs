@@ -8,11 +8,13 @@ use hardware::replay::{ReplayError, Replayed};
 use hardware::simulated::{self, Robot as Body};
 use hardware::{Authority, Driver, Gate, Latch, Listening, Sink};
 use record::log::{ChannelId, RunInfo, Writer};
+use sim::plan::Landmark;
 use sim::{Model, WorldPlan};
 use types::messages::{
-    Battery, Bumper, Echoes, FrameTransform, Gyro, Head, Image, LaserScan, Transforms, Twist, WheelTicks,
+    Battery, Bumper, Echoes, FrameTransform, Gyro, Head, Image, Landmarks, LaserScan, Transforms, Twist,
+    WheelTicks,
 };
-use types::{Duration, Header, Message, Pose, Time};
+use types::{Duration, Header, Message, Point, Pose, Time};
 
 /// What was heard: the port, the stamp, the bytes as they go to other programs.
 type Heard = Vec<(&'static str, Time, Vec<u8>)>;
@@ -57,12 +59,18 @@ impl Sink for Encoded {
     fn head(&mut self, stamp: Time, head: &Head) {
         self.take("head", stamp, head, &[]);
     }
+    fn landmarks(&mut self, stamp: Time, landmarks: &Landmarks) {
+        self.take("landmarks", stamp, landmarks, &[]);
+    }
 }
 
 /// A drive of two seconds in a hall.
 fn driven() -> (Gate, Heard) {
-    let model = Model::h1().with_laser(181, std::f64::consts::PI);
-    let plan = WorldPlan::hall(8.0, 6.0);
+    let mut model = Model::h1().with_laser(181, std::f64::consts::PI);
+    model.landmarks = Some(Default::default());
+    model.infrared = Some(Default::default());
+    let mut plan = WorldPlan::hall(8.0, 6.0);
+    plan.landmarks.push(Landmark { at: Point::new(5.5, 3.5), ..Landmark::default() });
     let body = Body { name: "h1".into(), model, start: Pose::new(4.0, 3.0, 0.3), goal: None };
     let (mut bodies, _) = simulated::raise(&plan, 5, &[body]).unwrap();
     let (mut gate, mut heard) = (Gate::new(bodies.remove(0), Latch::private()), Encoded::default());
@@ -89,6 +97,7 @@ fn log(name: &str, heard: &Heard, mounts: &[FrameTransform]) -> PathBuf {
     definitions.insert("gyro", Gyro::definition());
     definitions.insert("battery", Battery::definition());
     definitions.insert("head", Head::definition());
+    definitions.insert("landmarks", Landmarks::definition());
     let channel = writer.channel("h1.transforms", &Transforms::definition()).unwrap();
     let mut out = types::cdr::Writer::new();
     Transforms.encode(mounts, Time::ZERO, &mut out);
@@ -107,6 +116,9 @@ fn log(name: &str, heard: &Heard, mounts: &[FrameTransform]) -> PathBuf {
 fn a_logged_drive_is_replayed_byte_for_byte() {
     let (gate, heard) = driven();
     assert!(heard.iter().filter(|(port, ..)| *port == "image").count() == 30, "two seconds of pictures");
+    let seen =
+        |frame: &[u8]| heard.iter().any(|(port, _, cdr)| *port == "landmarks" && cdr.len() > frame.len());
+    assert!(seen(&[0; 28]), "the tube is seen");
     let path = log("drive", &heard, &gate.description().mounts);
     let mut replayed = Replayed::open(&path, "h1").unwrap();
     let description = replayed.describe();

@@ -154,6 +154,22 @@ fn wheels_that_turn_without_moving_it_and_a_wall_are_told() {
 }
 
 #[test]
+fn while_something_else_drives_it_is_patient_and_goes_on_from_there() {
+    let world = World::exact(Pose::default());
+    let mut goto = set_off(&world, parameters(), Goal::point(Point::new(2.0, 0.0)));
+    for _ in 0..1000 {
+        let report = goto.step(world.odometry, STEP);
+        assert!(
+            report.phase == Phase::Steering && fabs(report.twist.linear) <= 0.5 * STEP + 1e-12,
+            "{report:?}"
+        );
+        goto.yielded(Twist::ZERO);
+    }
+    goto.yielded(Twist::new(0.2, 0.0));
+    assert!(goto.step(world.odometry, STEP).twist.linear > 0.2);
+}
+
+#[test]
 fn what_the_localizer_finds_at_the_last_moment_is_driven_to() {
     for push in [0.028, 0.05, 0.3] {
         let mut world = World::exact(Pose::default());

@@ -32,6 +32,9 @@ pub(super) struct Outcome {
     granted: Vec<(String, String)>,
     /// What a reader of the figures must know besides.
     notes: Vec<String>,
+    /// What programs are told besides, by its key, and people, as a text of its own.
+    added: Vec<(&'static str, Json)>,
+    texts: Vec<String>,
     /// Ratios without their other system: it is not here.
     pub(super) missing: Vec<&'static str>,
     /// Ratios whose other system is here, but could not be measured; with what it said.
@@ -128,6 +131,16 @@ impl Outcome {
         self.notes.push(text.into());
     }
 
+    /// What programs are told besides, under a key of its own.
+    pub(super) fn add(&mut self, key: &'static str, value: Json) {
+        self.added.push((key, value));
+    }
+
+    /// What people are told besides: lines that end.
+    pub(super) fn text(&mut self, lines: String) {
+        self.texts.push(lines);
+    }
+
     /// Whether every ratio was measured.
     pub(super) fn is_whole(&self) -> bool {
         self.missing.is_empty() && self.failed.is_empty()
@@ -154,14 +167,18 @@ impl Outcome {
             row
         });
         let granted = self.granted.iter().map(|(thread, policy)| json!({"thread": thread, "policy": policy}));
-        json!({
+        let mut document = json!({
             "bench": name,
             "machine": machine::describe(),
             "granted": granted.collect::<Vec<_>>(),
             "figures": self.figures.iter().map(Measured::to_json).collect::<Vec<_>>(),
             "ratios": ratios.collect::<Vec<_>>(),
             "notes": self.notes,
-        })
+        });
+        for (key, value) in &self.added {
+            document[*key] = value.clone();
+        }
+        document
     }
 
     pub(super) fn to_text(&self, name: &str) -> String {
@@ -182,6 +199,7 @@ impl Outcome {
             ]);
         }
         out += &crate::run::table(&rows, 2);
+        out.extend(self.texts.iter().map(String::as_str));
         for ratio in &self.ratios {
             let range = ratio.range.map(|[least, most]| format!("; rounds from {least:.2} to {most:.2}"));
             out += &format!(

@@ -2,16 +2,20 @@
 
 use record::figure::{Drawing, Region};
 use serde_json::{Value as Json, json};
+use sim::hand::Standing;
 use sim::snapshot::Scenery;
 use types::{Point, Pose};
 
 use super::Notes;
+use crate::file::{self, Part};
 use crate::run::Ready;
 
 /// The name of the note with the scenery.
 const SCENERY: &str = "scenery";
 /// The name of the note with the robots.
 const ROBOTS: &str = "robots";
+/// The name of the note with the parts of the run that are drawn by themselves.
+const FIGURES: &str = "figures";
 
 /// What a log has to know of the world and the robots. It depends on the plan and the seed alone.
 pub(crate) fn notes(ready: &Ready) -> Notes {
@@ -32,7 +36,24 @@ pub(crate) fn notes(ready: &Ready) -> Notes {
         row
     });
     notes.insert(ROBOTS.into(), Json::Array(robots.collect()).to_string());
+    let parts = file::figures(&ready.plan);
+    if !parts.is_empty() {
+        let row = |part: &Part| json!([part.name, part.is_way, part.span.0, part.span.1]);
+        notes.insert(FIGURES.into(), parts.iter().map(row).collect::<Json>().to_string());
+    }
     notes
+}
+
+/// The parts of a log's run that are drawn by themselves.
+pub(super) fn parts(notes: &Notes) -> Vec<Part> {
+    let rows = notes.get(FIGURES).and_then(|text| serde_json::from_str::<Vec<Json>>(text).ok());
+    let part = |row: &Json| {
+        let (name, is_way) = (row[0].as_str()?.to_owned(), row[1].as_bool()?);
+        // A log is somebody's file: what is no name of a file is none of ours.
+        let is_plain = name.chars().all(|c| c.is_ascii_alphanumeric() || "-_".contains(c));
+        is_plain.then_some(Part { name, is_way, span: (row[2].as_f64()?, row[3].as_f64()?) })
+    };
+    rows.unwrap_or_default().iter().filter_map(part).collect()
 }
 
 /// The topic of what the robot's wheels are told: the output that is joined to its "drive".
@@ -63,6 +84,33 @@ fn scenery(scenery: &Scenery) -> Json {
         "discs": discs.collect::<Vec<_>>(),
         "regions": regions.collect::<Vec<_>>(),
     })
+}
+
+/// What a note of a thing begins with that was added while the run went.
+const STANDS: &str = "stands: ";
+
+/// The note of a thing that was added to the world.
+pub(crate) fn stands(thing: &Standing) -> String {
+    let outline = match thing.shape.corners(thing.pose) {
+        Some(corners) => json!({"corners": corners.iter().map(|p| point(*p)).collect::<Vec<_>>()}),
+        None => json!({"disc": [point(thing.pose.position()), thing.shape.reach()]}),
+    };
+    format!("{STANDS}{} {outline}", thing.name)
+}
+
+/// Draws the thing that a note tells of, if it tells of one.
+pub(super) fn draw_standing(drawing: &mut Drawing, note: &str) {
+    let Some(at) = note.strip_prefix(STANDS).and_then(|rest| rest.find('{').map(|at| &rest[at..])) else {
+        return;
+    };
+    let Ok(json) = serde_json::from_str::<Json>(at) else { return };
+    let corners: Vec<Point> =
+        json["corners"].as_array().into_iter().flatten().filter_map(read_point).collect();
+    for (k, corner) in corners.iter().enumerate() {
+        drawing.segments.push((*corner, corners[(k + 1) % corners.len()]));
+    }
+    let disc = &json["disc"];
+    drawing.circles.extend(read_point(&disc[0]).zip(disc[1].as_f64()));
 }
 
 fn read_point(json: &Json) -> Option<Point> {

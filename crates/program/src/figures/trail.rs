@@ -6,9 +6,12 @@ use record::figure::{Band, Drawing, Event};
 use record::log::{Message, RunInfo};
 use types::cdr::Reader;
 use types::message::Message as Typed;
-use types::messages::{Decision, Echoes, Grant, LaserScan, Odometry, Transforms, Twist};
+use types::messages::{
+    Decision, Echoes, Grant, LaserScan, Motion, Odometry, Report, Task, Transforms, Twist,
+};
 use types::{Point, Pose, Time};
 
+use super::TaskOutcome;
 use super::scenery::{self, KnownRobot};
 use crate::run::WORLD;
 
@@ -50,8 +53,12 @@ pub(super) struct Trail {
     pub(super) misses: BTreeMap<String, Vec<f64>>,
     /// From when on each agent was suspended, or was not any more.
     pub(super) rest: BTreeMap<String, Vec<(f64, bool)>>,
+    /// How tasks ended, in the order of their ends.
+    pub(super) tasks: Vec<TaskOutcome>,
     /// The first and the last time.
     pub(super) span: Option<(f64, f64)>,
+    /// The tasks, by their numbers.
+    asked: BTreeMap<u32, Task>,
     known: Vec<KnownRobot>,
     begun: Option<Time>,
     /// Where the laser sits on the robot.
@@ -63,7 +70,7 @@ const MOST_POINTS: usize = 60_000;
 /// So many points of the ring of sonars show a room and do not cover it.
 pub(super) const SHOWN_POINTS: usize = 2_500;
 /// Commands nearer to each other than this run into one line (s).
-const COMMANDS: f64 = 0.1;
+const COMMANDS: f64 = 0.04;
 /// A band shorter than this cannot be seen (s).
 const SHORTEST: f64 = 0.3;
 /// A person who moved less than this stands (m).
@@ -77,6 +84,23 @@ fn decode<T: Typed>(message: &Message) -> Option<(T, Vec<T::Element>)> {
     let mut row = Vec::new();
     let head = T::decode(&mut Reader::new(&message.cdr).ok()?, &mut row).ok()?;
     Some((head, row))
+}
+
+impl Seen {
+    /// The same in a part of the run; what was seen of the surroundings stays.
+    pub(super) fn within(&self, (from, until): (f64, f64)) -> Seen {
+        let is_part = |time: f64| (from..=until).contains(&time);
+        let ways = |way: &[(f64, Pose)]| way.iter().filter(|row| is_part(row.0)).copied().collect();
+        let rows = |rows: &[(f64, f64, f64)]| rows.iter().filter(|row| is_part(row.0)).copied().collect();
+        Seen {
+            way: ways(&self.way),
+            log_way: ways(&self.log_way),
+            odometry: ways(&self.odometry),
+            speed: rows(&self.speed),
+            commanded: rows(&self.commanded),
+            ..self.clone()
+        }
+    }
 }
 
 impl Trail {
@@ -160,6 +184,8 @@ impl Trail {
             LaserScan::NAME if self.is_robot(agent) && port == "scan" => self.scan(agent, message),
             Odometry::NAME => self.odometry(time, agent, port, message),
             Twist::NAME => self.command(time, &topic, message),
+            Report::NAME => self.report(time, message),
+            Task::NAME => self.task(message),
             Grant::NAME => {
                 if let Some((grant, _)) = decode::<Grant>(message) {
                     let name = grant.agent.as_str().to_owned();
@@ -274,11 +300,40 @@ impl Trail {
         }
     }
 
+    /// The first that tells that a task is over counts: the others pass it on.
+    fn report(&mut self, time: f64, message: &Message) {
+        let Some((last, _)) = decode::<Report>(message) else { return };
+        let is_told = self.tasks.iter().any(|known| known.task == last.task);
+        if last.task > 0 && last.progress.is_over() && !is_told {
+            let off = self.off(last.task);
+            self.tasks.push(TaskOutcome { task: last.task, at: time, last, off });
+        }
+    }
+
+    fn task(&mut self, message: &Message) {
+        if let Some((task, _)) = decode::<Task>(message) {
+            self.asked.insert(task.number, task);
+        }
+    }
+
+    /// How far the only robot truly is from the place of a task, where that is one of the map (m).
+    fn off(&self, task: u32) -> Option<f64> {
+        let task = self.asked.get(&task)?;
+        let has_place = matches!(task.motion, Motion::Goto | Motion::Path | Motion::Dock);
+        let mut robots = self.robots.values().filter_map(|seen| seen.way.last());
+        let (Some((_, pose)), None) = (robots.next(), robots.next()) else { return None };
+        let is_true = has_place && task.frame.as_str() == "map";
+        is_true.then(|| pose.position().distance(task.target.position()))
+    }
+
     fn note(&mut self, time: f64, message: &Message) {
         let Ok(value) = message.value() else { return };
         let Some(table) = value.as_table() else { return };
         let text = |key: &str| table.get(key).and_then(|entry| entry.value.as_text()).unwrap_or_default();
         let (who, what) = (text("name"), text("msg"));
+        if who == WORLD {
+            return scenery::draw_standing(&mut self.drawing, what);
+        }
         if what.starts_with("missed its deadline") {
             self.misses.entry(who.to_owned()).or_default().push(time);
         }

@@ -9,7 +9,7 @@ use types::value::{Mistake, Span, Table, TableReader};
 use super::read::{ROBOT, Reader, span_of_time, unknown};
 
 /// The entries that every agent can have; all others are its parameters.
-const ENTRIES: [&str; 23] = [
+const ENTRIES: [&str; 24] = [
     "is",
     "robot",
     "period",
@@ -19,6 +19,7 @@ const ENTRIES: [&str; 23] = [
     "deadline",
     "on",
     "min_gap",
+    "wake_gap",
     "executor",
     "on_death",
     "hang_after",
@@ -138,6 +139,7 @@ fn timing(r: &mut TableReader<'_>, agent: &mut AgentPlan) {
     agent.cost = span_of_time(r, "cost");
     agent.deadline = span_of_time(r, "deadline");
     agent.min_gap = span_of_time(r, "min_gap").unwrap_or(Duration::ZERO);
+    agent.wake_gap = span_of_time(r, "wake_gap").unwrap_or(Duration::ZERO);
     agent.hang_after = span_of_time(r, "hang_after");
     if let (Some(period), Some(deadline)) = (agent.period, agent.deadline)
         && deadline > period

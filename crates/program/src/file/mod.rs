@@ -12,13 +12,15 @@
 //! | TOML to a tree of values | `tree` |
 //! | built-in scenarios and worlds, and files by name | `library` |
 //! | `--set KEY=VALUE` | `set` |
-//! | the tree to a plan, with all mistakes | `read`, with `agent`, `group`, `wires`, `decide`, `modes`, `knowledge`, `requests`, `spoken` |
+//! | the tree to a plan, with all mistakes | `read`, with `agent`, `group`, `wires`, `decide`, `modes`, `figure`, `knowledge`, `requests`, `calls` |
 //! | the plan to a text | `write` |
 
 mod agent;
 mod burden;
+pub(crate) mod calls;
 mod compare;
 mod decide;
+mod figure;
 mod floor;
 mod group;
 pub(crate) mod knowledge;
@@ -28,7 +30,6 @@ mod read;
 mod requests;
 mod set;
 mod sources;
-mod spoken;
 mod syntax;
 pub(crate) mod tree;
 mod wires;
@@ -37,12 +38,12 @@ mod write;
 pub(crate) use burden::{as_declared, burdens, processors};
 pub(crate) use compare::compared;
 pub(crate) use decide::read_alone;
+pub(crate) use figure::{Part, figures};
 pub use library::{Found, Shelf};
 pub(crate) use read::SECTIONS;
 pub use read::{Loaded, check, load, read, read_plan};
 pub(crate) use set::set_in;
 pub use sources::{Mistakes, Sources};
-pub(crate) use spoken::in_bytes;
 pub use write::write_plan;
 
 use types::value::{Table, Value};

@@ -3,8 +3,8 @@
 use runtime::{FaultKind, TimedRequest};
 use types::value::{Mistake, Span, Table, TableReader};
 
+use super::calls;
 use super::read::{Reader, span_of_time};
-use super::spoken;
 
 /// The commands that change a running system.
 const VERBS: [&str; 13] = [
@@ -48,26 +48,6 @@ impl Reader<'_> {
         outer.finish(&mut self.mistakes);
     }
 
-    /// Whether a message in words is one of the type of its port. The ports of robots are known when these are made.
-    fn judge_message(&mut self, words: &[String], at: Span) {
-        let Some(name) = words.get(1) else {
-            let what = format!("\"{}\" needs the name of a port", words[0]);
-            self.mistakes.push(Mistake::new(at, what).help("as in \"call navigation.go x=3 y=1\""));
-            return;
-        };
-        let Some(name) = self.end(name, at) else { return };
-        let agent = name.rsplit_once('.').and_then(|(agent, _)| self.plan.agent(agent));
-        let Some(kind) = agent.and_then(|agent| self.registry.get(&agent.kind)) else { return };
-        let find = |name: &str| kind.port(name.rsplit_once('.')?.1);
-        if let Err(refusal) = spoken::in_bytes(words, find) {
-            let mistake = Mistake::new(at, refusal.what);
-            self.mistakes.push(match refusal.help {
-                Some(help) => mistake.help(help),
-                None => mistake,
-            });
-        }
-    }
-
     /// What can be seen of a request before the system runs.
     fn judge(&mut self, words: &[String], at: Span) {
         let Some((verb, rest)) = words.split_first() else { return };
@@ -75,8 +55,14 @@ impl Reader<'_> {
             self.mistakes.push(Mistake::unknown(at, "request", verb, VERBS));
             return;
         }
-        if spoken::VERBS.contains(&verb.as_str()) {
-            self.judge_message(words, at);
+        if calls::VERBS.contains(&verb.as_str())
+            && let Err(refusal) = calls::in_bytes(words, &self.plan, self.registry)
+        {
+            let mistake = Mistake::new(at, refusal.what);
+            self.mistakes.push(match refusal.help {
+                Some(help) => mistake.help(help),
+                None => mistake,
+            });
         }
         if verb != "fault" {
             return;

@@ -139,6 +139,7 @@ fn agent(agent: &AgentPlan, decides: bool, out: &mut String) -> fmt::Result {
         several => writeln!(out, "on = {}", list(several))?,
     }
     span("min_gap", Some(agent.min_gap).filter(|gap| *gap != Duration::ZERO), out)?;
+    span("wake_gap", Some(agent.wake_gap).filter(|gap| *gap != Duration::ZERO), out)?;
     if let Some(executor) = &agent.executor {
         writeln!(out, "executor = {}", Value::from(executor.as_str()))?;
     }

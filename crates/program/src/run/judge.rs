@@ -9,12 +9,13 @@ use hardware::gate::Counts;
 use hardware::latch::Cause;
 use hardware::simulated::Truth;
 use runtime::{Incident, Observer, Verdict};
+use sim::hand::Standing;
 use types::messages::{Odometry, Twist};
 use types::{Duration, Name, Pose, Time};
 
 use super::asked::{self, Asked, Deed, OUTSIDE};
 use super::prepare::Ready;
-use crate::terminal;
+use crate::{figures, terminal};
 
 /// How often the judge looks. Goals and collisions are watched by the world itself in every step of physics, so this only
 /// says how late a run ends.
@@ -79,6 +80,8 @@ pub(crate) struct Judge {
     /// Where the truth goes; nobody wants it when nothing is logged.
     facts: Option<Facts>,
     people: Vec<String>,
+    /// What was added to the world and is known to the log.
+    added: Vec<Standing>,
     looks: u64,
     /// How many incidents it has seen.
     seen: usize,
@@ -116,6 +119,7 @@ impl Judge {
             speed: None,
             begun: None,
             facts,
+            added: Vec::new(),
             looks: 0,
             seen: 0,
             moved: None,
@@ -189,12 +193,18 @@ impl Judge {
         self.seen = incidents.len();
     }
 
-    fn keep(&self, time: Time) {
+    fn keep(&mut self, time: Time) {
         let (Some(truth), Some(facts)) = (&self.truth, &self.facts) else { return };
         for (name, robot) in truth.robots() {
             let twist = Twist::new(robot.truth.linear, robot.truth.angular);
             facts.put(fact(time, &name, robot.truth.pose, twist));
         }
+        // What was added to the running world, and what was moved in it, is noted: figures draw it.
+        let added = truth.added();
+        for thing in added.iter().filter(|thing| !self.added.contains(thing)) {
+            facts.put(Fact { time, what: What::Asked { by: WORLD, text: figures::stands(thing) } });
+        }
+        self.added = added;
         for name in &self.people {
             if let Some(person) = truth.person(name).filter(|person| person.present) {
                 let pose = Pose::new(person.at.x, person.at.y, person.facing);

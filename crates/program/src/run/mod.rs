@@ -6,6 +6,8 @@
 //!                                     Judge ─────┘         log ◀┘  └▶ screen, control
 //! ```
 
+#[cfg(test)]
+mod admitted;
 mod asked;
 mod burden;
 mod compare;
@@ -18,6 +20,7 @@ mod screen;
 mod seeds;
 mod serve;
 mod summary;
+mod tasks;
 mod timing;
 mod useful;
 
@@ -44,7 +47,7 @@ use knowing::Knowing;
 pub(crate) use asked::Asked;
 pub(crate) use burden::{BurdenArgs, burden};
 pub(crate) use judge::{Facts, Judge, WORLD};
-pub(crate) use prepare::{ROBOT_KIND, Ready, Scenario};
+pub(crate) use prepare::{ROBOT_KIND, Ready, Scenario, WORLD_AGENT, WORLD_KIND};
 pub(crate) use recorder::{LogFile, choice};
 pub(crate) use serve::start as serve;
 pub(crate) use summary::{Summary, failure, span, table};
@@ -175,14 +178,8 @@ impl One<'_> {
         }
         let mut plan = ready.plan.clone();
         let mut firings = self.knowing.map(|knowing| knowing.firings(self.clock, self.limit(&ready)));
-        let spoken = plan.requests.iter_mut().map(|request| &mut request.words);
         let scheduled = firings.iter_mut().flatten().map(|firing| &mut firing.words);
-        for words in spoken.chain(scheduled) {
-            // What is no message of its port is refused at its time, as everything that is wrong by then.
-            if let Ok(bytes) = file::in_bytes(words, |name| ready.port(name)) {
-                *words = bytes;
-            }
-        }
+        file::calls::ready(&mut plan, scheduled, &ready.registry);
         let asked = Asked::of(&mut plan, firings.unwrap_or_default(), self.repeat.as_ref());
         let log = self.log(&ready, &asked)?;
         let facts = log.as_ref().map(|(_, facts, _)| facts.clone());
@@ -341,6 +338,7 @@ impl One<'_> {
         if log.is_file() {
             summary.files.insert(0, log.clone());
         }
+        summary.tasks = figures::tasks(log).unwrap_or_default();
         let made = figures::of_log(log, &place.folder, Some(figures::timing(&summary.agents)));
         match made {
             Ok(files) => summary.files.extend(files),
@@ -371,8 +369,9 @@ fn plan_text(ready: &Ready) -> String {
     file::write_plan(&plan_of_file(ready.plan.clone()))
 }
 
-/// The plan as its file has it: the gates' own types are a matter of the run.
+/// The plan as its file has it: the gates' own types are a matter of the run, and so is the agent that changes its world.
 pub(crate) fn plan_of_file(mut plan: Plan) -> Plan {
+    plan.agents.retain(|agent| agent.kind != WORLD_KIND);
     for agent in plan.agents.iter_mut().filter(|agent| agent.kind.starts_with(ROBOT_KIND)) {
         agent.kind = "robot".to_owned();
     }

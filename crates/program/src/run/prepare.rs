@@ -6,9 +6,9 @@ use std::sync::{Arc, Mutex, PoisonError};
 use hardware::description::Periods;
 use hardware::gate::Counts;
 use hardware::robot::{CYCLE, RobotParams};
-use hardware::simulated::{self, Truth};
+use hardware::simulated::{self, Hands, SERVICES, Truth};
 use hardware::{Berth, ClockKind, Gate, Latch, RobotDescription, Spec};
-use runtime::{Admission, Params as _, Plan, PortInfo, Registry};
+use runtime::{Admission, AgentPlan, Params as _, Plan, Registry};
 use sim::model::Shape;
 use sim::{Drawn, Goal, Model, Vary, WorldPlan};
 use types::Duration;
@@ -153,6 +153,9 @@ impl Scenario {
         }
         let (drivers, truth) = simulated::raise(&drawn.plan, seed, &robots)
             .map_err(|error| self.wrong(vec![Mistake::new(rows[0].key_at, error.to_string())]))?;
+        if let Some(driver) = drivers.first() {
+            ready.open_to_hands(&driver.hands());
+        }
         for (driver, robot) in drivers.into_iter().zip(&robots) {
             if let Some(row) = rows.iter().find(|row| row.key == robot.name) {
                 ready.enter(row, Gate::new(driver, Latch::private()), robot.model.shape, None);
@@ -193,7 +196,7 @@ fn gate_keys() -> impl Iterator<Item = &'static str> {
 type Every = fn(&Periods) -> Option<Duration>;
 
 /// The readings of a robot that come by a clock of its own.
-const READINGS: [(&str, Every); 9] = [
+const READINGS: [(&str, Every); 10] = [
     ("sonar", |periods| periods.sonar),
     ("scan", |periods| periods.scan),
     ("image", |periods| periods.image),
@@ -203,15 +206,10 @@ const READINGS: [(&str, Every); 9] = [
     ("battery", |periods| periods.battery),
     ("head", |periods| periods.head),
     ("pose", |periods| periods.pose),
+    ("landmarks", |periods| periods.landmarks),
 ];
 
 impl Ready {
-    /// A port by its name.
-    pub(crate) fn port(&self, name: &str) -> Option<&PortInfo> {
-        let (agent, port) = name.rsplit_once('.')?;
-        self.registry.get(&self.plan.agent(agent)?.kind)?.port(port)
-    }
-
     /// The time between two readings at a port of a robot. What was recorded comes no more often than its gate looks.
     pub(crate) fn pace(&self, port: &str) -> Option<Duration> {
         let (robot, port) = port.rsplit_once('.')?;
@@ -231,6 +229,21 @@ impl Ready {
             }
         }
         Admission { processors, overhead, pace, force }
+    }
+
+    /// Adds the agent through which the world is changed, unless the plan has one of this name.
+    fn open_to_hands(&mut self, hands: &Hands) {
+        if self.plan.agent(WORLD_AGENT).is_some() {
+            return;
+        }
+        self.registry.extend([hands.agent_type(WORLD_KIND)]);
+        self.plan.agents.push(AgentPlan {
+            name: WORLD_AGENT.to_owned(),
+            kind: WORLD_KIND.to_owned(),
+            on: SERVICES.map(str::to_owned).to_vec(),
+            executor: Some("gate".to_owned()),
+            ..AgentPlan::default()
+        });
     }
 
     /// Puts a gate behind the agent of its robot. Each gate is a type of agent of its own.
@@ -265,5 +278,9 @@ fn kind_of(robot: &str) -> &'static str {
     kind
 }
 
+/// The agent through which a simulated world is changed.
+pub(crate) const WORLD_AGENT: &str = "world";
+/// Its type. No file can name it: each run has its own world.
+pub(crate) const WORLD_KIND: &str = "simulated world";
 /// What the types of robots' agents begin with.
 pub(crate) const ROBOT_KIND: &str = "robot ";

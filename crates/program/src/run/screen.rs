@@ -286,6 +286,12 @@ fn picture(truth: &Truth, heard: &Heard, columns: u16, rows: u16) -> String {
     for disc in &scenery.discs {
         dots.circle(disc.centre, disc.radius, WALL);
     }
+    for thing in &snapshot.added {
+        match thing.shape.corners(thing.pose) {
+            None => dots.circle(thing.pose.position(), thing.shape.reach(), WALL),
+            Some(corners) => (0..4).for_each(|k| dots.line(corners[k], corners[(k + 1) % 4], WALL)),
+        }
+    }
     for person in &snapshot.people {
         dots.circle(person.disc.centre, person.disc.radius, PERSON);
         dots.letter(person.disc.centre, 'P', PERSON);

@@ -13,7 +13,9 @@ use super::judge;
 use super::knowing;
 use super::prepare::Ready;
 use super::recorder::LogOutcome;
+use super::tasks;
 use super::useful::{Done, useful};
+use crate::figures::TaskOutcome;
 use crate::terminal::paint;
 
 /// What became of a robot.
@@ -78,6 +80,8 @@ pub(crate) struct Summary {
     /// Pictures a second that were to be kept.
     pub(crate) images: f64,
     pub(crate) files: Vec<PathBuf>,
+    /// What became of the tasks of the reactive layer, where there is a log.
+    pub(crate) tasks: Vec<TaskOutcome>,
     pub(crate) repeat: Option<Repeated>,
     /// What the agents did whose plan says how important they are.
     pub(crate) done: Vec<Done>,
@@ -142,6 +146,7 @@ impl Summary {
             log: None,
             images: 0.0,
             files: Vec::new(),
+            tasks: Vec::new(),
             repeat: None,
             done: Vec::new(),
             compared: Compared::default(),
@@ -203,6 +208,11 @@ impl Summary {
         self.truths().map(|truth| truth.collisions).reduce(|a, b| a + b)
     }
 
+    /// How often others ran into any robot; nothing where nobody knows.
+    pub(crate) fn bumped(&self) -> Option<u32> {
+        self.truths().map(|truth| truth.bumped).reduce(|a, b| a + b)
+    }
+
     /// The smallest distance of any robot to anything (m).
     pub(crate) fn closest(&self) -> Option<f64> {
         self.truths().map(|truth| truth.closest).reduce(f64::min)
@@ -253,6 +263,7 @@ impl Summary {
             "ended": self.ended,
             "goal": {"met": self.met, "why": self.why, "stages_s": self.stages()},
             "collisions": self.collisions(),
+            "bumped": self.bumped(),
             "closest_m": self.closest(),
             "distance_m": self.distance(),
             "deadlines": {
@@ -267,6 +278,7 @@ impl Summary {
                     "nominal": done.work.nominal, "in_time": done.work.in_time, "quality": done.work.quality,
                 })).collect::<Vec<_>>(),
             })),
+            "tasks": tasks::document(&self.tasks),
             "compared": self.compared.document,
             "messages": {"sent": self.sent, "dropped": self.dropped, "refused": self.refused},
             "allocations": self.allocations.as_ref().map(|by| json!({
@@ -359,6 +371,7 @@ impl Summary {
                 }
             });
         }
+        tasks::text(&self.tasks).into_iter().for_each(&mut line);
         self.compared.text.iter().for_each(|text| line(text.clone()));
         for (i, file) in self.files.iter().enumerate() {
             line(format!("  {:<12} {}", if i == 0 { "files" } else { "" }, file.display()));
@@ -564,7 +577,12 @@ fn robot_lines(robot: &RobotOutcome, several: bool, begun: Time) -> Vec<String> 
         } else {
             format!("closest {:.2} m", truth.closest)
         };
-        lines.push(format!("  safety       {who}{collisions}, {closest}"));
+        let bumped = match truth.bumped {
+            0 => String::new(),
+            1 => ", others ran into it once".to_owned(),
+            n => format!(", others ran into it {n} times"),
+        };
+        lines.push(format!("  safety       {who}{collisions}{bumped}, {closest}"));
         lines.push(format!("  way          {who}{:.1} m", truth.distance));
     }
     if robot.shadow {
@@ -639,6 +657,7 @@ fn robot_json(robot: &RobotOutcome, begun: Time) -> Json {
     json!({
         "name": robot.name,
         "collisions": robot.truth.map(|truth| truth.collisions),
+        "bumped": robot.truth.map(|truth| truth.bumped),
         "closest_m": robot.truth.map(|truth| truth.closest),
         "distance_m": robot.truth.map(|truth| truth.distance),
         "commands": robot.commands,

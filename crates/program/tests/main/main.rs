@@ -3,6 +3,7 @@
 #![allow(clippy::unwrap_used)] // a test that cannot go on says where
 
 mod localizer;
+mod memory;
 mod mistakes;
 mod round_trip;
 mod schema;

@@ -238,6 +238,7 @@ fn agents() -> impl Strategy<Value = Vec<AgentPlan>> {
                     deadline: ranged.then_some(period),
                     on: if leave { vec!["ranges".into(), "odometry".into()] } else { vec!["ranges".into()] },
                     min_gap: Duration(gap),
+                    wake_gap: Duration(999 - gap),
                     executor: leave.then(|| "control".to_owned()),
                     on_death: if leave { OnDeath::Leave } else { OnDeath::Restart },
                     hang_after,

@@ -380,15 +380,16 @@ impl Core {
             seat.put_off = Time::NEVER;
             self.ready.mark(slot);
         }
-        let alarm = if goes_on { seat.alarm } else { Time::NEVER };
+        // What it asked for: sooner or later than before, or while it was suspended.
+        let alarm = seat.ask_anew(now, goes_on);
         if next < Time::NEVER {
             self.push_release(next, slot);
         }
+        if let Some(alarm) = alarm {
+            self.push_release(alarm, slot);
+        }
         if goes_on {
-            // What it asked for, and what came, before or while it was suspended.
-            if alarm < Time::NEVER {
-                self.push_release(alarm.max(now), slot);
-            }
+            // What came before or while it was suspended.
             self.find_whether_ready(slot);
         }
     }

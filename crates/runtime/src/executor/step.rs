@@ -188,8 +188,7 @@ impl Core {
                 core.reported(turn, at.time, fault);
                 return Some(Ended::Normally);
             }
-            if let Some(alarm) = alarm.filter(|alarm| *alarm < seat.alarm) {
-                seat.alarm = alarm;
+            if let Some(alarm) = alarm.and_then(|wish| seat.ask(wish, begun.time)) {
                 core.push_release(alarm, turn.job.slot);
             }
             core.after_step(context, seat, turn.job.slot);

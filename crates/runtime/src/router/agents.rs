@@ -112,6 +112,8 @@ impl Router {
             is_due: false,
             alarm: Time::NEVER,
             put_off: Time::NEVER,
+            wish: Time::NEVER,
+            last_wake: Time(i64::MIN / 2),
             refined: 0,
             last_step: Time(i64::MIN / 2),
             ready_at: Time::NEVER,

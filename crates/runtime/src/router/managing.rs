@@ -147,7 +147,9 @@ impl Router {
         let found = table.system.analyse().unwrap_or_default();
         let gap = |at: usize, plan: &AgentPlan| {
             let streams = found.get(at).map(|found| &found.streams[..]).unwrap_or_default();
-            let period = streams.iter().map(|stream| stream.period).min()?;
+            // What it asks for itself goes on as it is.
+            let by_others = streams.iter().filter(|stream| stream.after.is_some());
+            let period = by_others.map(|stream| stream.period).min()?;
             plan.period.is_none().then(|| Duration(period.to_integer() as i64))
         };
         let order: Vec<AgentId> = self.in_order().iter().map(|known| known.id).collect();

@@ -12,8 +12,18 @@ use crate::request::Refusal;
 use crate::stats::Window;
 
 /// What can be set of any agent beside its parameters.
-pub const TIMING_KEYS: [&str; 9] =
-    ["period", "deadline", "min_gap", "cost", "method", "refinement", "budget", "importance", "suspended"];
+pub const TIMING_KEYS: [&str; 10] = [
+    "period",
+    "deadline",
+    "min_gap",
+    "wake_gap",
+    "cost",
+    "method",
+    "refinement",
+    "budget",
+    "importance",
+    "suspended",
+];
 
 /// What was asked for of that which the resource manager may set otherwise.
 #[derive(Clone, Debug, PartialEq)]
@@ -71,6 +81,7 @@ fn put(plan: &mut AgentPlan, key: &str, value: &Value) -> Reply<()> {
         "refinement" => plan.refinement = Some(span(key, value)?),
         "budget" => plan.budget = Some(span(key, value)?),
         "min_gap" => plan.min_gap = span(key, value)?,
+        "wake_gap" => plan.wake_gap = span(key, value)?,
         "method" => {
             let name = value.as_text();
             let refusal = || Refusal::new(format!("method must be the name of one, not {value}"));

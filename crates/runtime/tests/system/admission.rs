@@ -229,6 +229,11 @@ fn who_is_rigid_or_may_not_give_enough_or_is_asked_for_is_not_proposed() {
     let mut said = giving(None, Some(90));
     said.agent_mut("low").unwrap().deadline = Some(Duration::millis(40));
     nothing(&mut said, request);
+    // Then others give what is needed.
+    let mut said = giving(Some(30), Some(90));
+    said.agent_mut("low").unwrap().deadline = Some(Duration::millis(40));
+    let refused = &self::said(&asked(&mut said, 1, &[request]).unwrap())[0];
+    assert_eq!(proposed(refused), "set high period=13ms");
 }
 
 #[test]
@@ -277,7 +282,7 @@ fn a_plan_that_does_not_fit_is_told_what_could_be_set_at_its_start() {
 }
 
 proptest::proptest! {
-    #![proptest_config(proptest::prelude::ProptestConfig::with_cases(64))]
+    #![proptest_config(proptest::prelude::ProptestConfig::with_cases(200))]
 
     /// Whatever is refused with a proposal is admitted once that was done, and nobody is set beyond what it allows.
     #[test]

@@ -21,11 +21,17 @@ struct StampParams {
     /// Whether it notes.
     #[param(default = false)]
     notes: bool,
+    /// How long after each step it asks for another one (ms); nothing below zero.
+    #[param(default = -1.0, min = -1.0)]
+    asks: f64,
 }
 
 impl Agent for Stamp {
     fn step(&mut self, step: &mut Step) -> Result<(), Fault> {
         self.out.send(Twist::new(step.now.seconds(), 0.0));
+        if self.params.asks >= 0.0 {
+            step.wake_at(step.now + Duration::from_seconds(self.params.asks * 1e-3));
+        }
         while let Some(got) = self.from.take() {
             if self.params.notes {
                 runtime::note!("sent at {} s, seen at {} s", got.linear, step.now.seconds());
@@ -36,7 +42,7 @@ impl Agent for Stamp {
 }
 
 fn on(plan: &mut Plan, name: &str, executor: &str, period: i64, cost: i64) {
-    plan.add::<Stamp>(name, StampParams { notes: false });
+    plan.add::<Stamp>(name, StampParams { notes: false, asks: -1.0 });
     plan.every(name, Duration::millis(period));
     let agent = plan.agent_mut(name).unwrap();
     agent.executor = Some(executor.to_owned());
@@ -155,7 +161,9 @@ struct Drawn {
 }
 
 fn drawn() -> impl Strategy<Value = Drawn> {
-    let one = (1i64..=8, 1i64..=6, 0usize..4, proptest::option::of(0usize..5), 1u32..3);
+    // Some ask for steps themselves, sooner or later than they may.
+    let asks = proptest::option::weighted(0.4, (0i64..60, 1i64..=6));
+    let one = (1i64..=8, 1i64..=6, 0usize..4, proptest::option::of(0usize..5), 1u32..3, asks);
     (
         proptest::collection::vec(one, 1..=6),
         proptest::collection::vec(0usize..3, 4),
@@ -170,9 +178,14 @@ fn drawn() -> impl Strategy<Value = Drawn> {
                 let executor = plan.executors.iter_mut().find(|executor| executor.name == *name).unwrap();
                 executor.cpus = if pin < processors { vec![pin] } else { Vec::new() };
             }
-            for (at, (cost, tens, executor, source, every)) in agents.into_iter().enumerate() {
+            for (at, (cost, tens, executor, source, every, asks)) in agents.into_iter().enumerate() {
                 let name = format!("a{at}");
                 on(&mut plan, &name, names[executor], tens * 20, cost);
+                if let Some((after, tens)) = asks {
+                    let agent = plan.agent_mut(&name).unwrap();
+                    agent.params.set("asks", Value::from(after as f64));
+                    agent.wake_gap = Duration::millis(tens * 20);
+                }
                 if let Some(source) = source.filter(|_| at > 0) {
                     let agent = plan.agent_mut(&name).unwrap();
                     agent.deadline = agent.period.take();
@@ -189,6 +202,7 @@ fn drawn() -> impl Strategy<Value = Drawn> {
                 if let (Some(agent), None) = (agents.next(), agents.next())
                     && deadlines[at % deadlines.len()]
                     && agent.on.is_empty()
+                    && agent.wake_gap == Duration::ZERO
                 {
                     *executor = runtime::ExecutorPlan::by_deadline(&executor.name);
                 }

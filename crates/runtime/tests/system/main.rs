@@ -21,6 +21,7 @@ mod requests;
 mod stuck;
 mod successor;
 mod thousand;
+mod wakes;
 mod wall;
 
 use runtime::{

@@ -31,6 +31,10 @@ pub struct Model {
     pub sonar: Option<Sonar>,
     /// The laser, if there is one.
     pub laser: Option<Laser>,
+    /// What sees landmarks, if there is something.
+    pub landmarks: Option<LandmarkSensor>,
+    /// What hears the transmitters of landmarks, if there is something.
+    pub infrared: Option<Infrared>,
     /// The gyro.
     pub gyro: Gyro,
     /// The head that carries the camera.
@@ -202,6 +206,50 @@ pub struct Laser {
     pub period: Duration,
 }
 
+/// A sensor that sees landmarks: from its middle it tells range and bearing of each, as what works on the pictures of a camera
+/// does. It sits above the point between the wheels.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct LandmarkSensor {
+    /// How wide it sees (rad).
+    pub field: f64,
+    /// Whether it looks where the head looks, and not always ahead.
+    pub on_head: bool,
+    /// Height above the floor (m): what is at least as high hides what is behind it.
+    pub height: f64,
+    /// Nearer landmarks are not seen (m, to the middle).
+    pub min_range: f64,
+    /// Landmarks further away are not seen (m, to the middle).
+    pub max_range: f64,
+    /// Standard deviation of a range in proportion to it.
+    pub relative_noise: f64,
+    /// Standard deviation at range zero (m).
+    pub noise: f64,
+    /// Standard deviation of a bearing (rad).
+    pub bearing_noise: f64,
+    /// Whether it tells which landmark it sees.
+    pub identifies: bool,
+    /// Probability that a landmark in view is not told.
+    pub miss: f64,
+    /// Probability that it is told to be another one of the world.
+    pub mistake: f64,
+    /// How often it looks.
+    pub period: Duration,
+}
+
+/// Receivers all around for the transmitters of landmarks. They tell which landmark is heard and from which of its sides, but
+/// neither how far nor where it is.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Infrared {
+    /// Height above the floor (m).
+    pub height: f64,
+    /// Transmitters further away are not heard (m).
+    pub max_range: f64,
+    /// Probability that a transmitter in reach is not heard.
+    pub miss: f64,
+    /// How often the receivers are read.
+    pub period: Duration,
+}
+
 /// A gyro about the vertical.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Gyro {
@@ -295,6 +343,8 @@ impl Model {
             },
             sonar: Some(Sonar::default()),
             laser: None,
+            landmarks: None,
+            infrared: None,
             gyro: Gyro { bias: 0.002, noise: 0.005, period: Duration::millis(10) },
             head: Head { max_pan: 1.4, max_tilt: 0.6, speed: 1.5, period: Duration::millis(50) },
             camera: Some(Camera::default()),
@@ -416,6 +466,34 @@ impl Default for Laser {
             dropout: 0.002,
             period: Duration::millis(100),
         }
+    }
+}
+
+impl Default for LandmarkSensor {
+    /// A camera that measures a tube by the distance of its two colours: 0.8 to 3 m, a few centimetres at the far end; all tubes
+    /// look the same to it.
+    fn default() -> LandmarkSensor {
+        LandmarkSensor {
+            field: 60.0f64.to_radians(),
+            on_head: true,
+            height: 1.0,
+            min_range: 0.8,
+            max_range: 3.0,
+            relative_noise: 0.01,
+            noise: 0.005,
+            bearing_noise: 0.01,
+            identifies: false,
+            miss: 0.05,
+            mistake: 0.0,
+            period: Duration::millis(100),
+        }
+    }
+}
+
+impl Default for Infrared {
+    /// Up to 2 m, ten times a second.
+    fn default() -> Infrared {
+        Infrared { height: 0.35, max_range: 2.0, miss: 0.02, period: Duration::millis(100) }
     }
 }
 

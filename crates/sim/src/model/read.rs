@@ -4,7 +4,9 @@ use types::Duration;
 use types::geometry::{PI, TAU};
 use types::value::{Mistake, Span, Table, TableReader, Value};
 
-use super::{Battery, Camera, Drive, Gyro, Head, Laser, Model, NAMES, Shape, Sonar};
+use super::{
+    Battery, Camera, Drive, Gyro, Head, Infrared, LandmarkSensor, Laser, Model, NAMES, Shape, Sonar,
+};
 use crate::colour::Colour;
 use crate::read::{not_an_angle, read_angle};
 
@@ -14,8 +16,8 @@ const PERIODS: (Duration, Duration) = (Duration::millis(1), Duration::secs(3600)
 impl Model {
     /// The model that a robot's table names with `model` (else [`Model::h1`]), with every entry of the table in place of its own.
     ///
-    /// `radius` makes a round body, `body = { length = 0.5, width = 0.4 }` a rectangular one. A sub-table `[sonar]`, `[laser]` or
-    /// `[camera]` adds what the model has not; `sonar = false` takes it away. `at` is where the table stands, and `elsewhere`
+    /// `radius` makes a round body, `body = { length = 0.5, width = 0.4 }` a rectangular one. A sub-table `[sonar]`, `[laser]`,
+    /// `[camera]`, `[landmarks]` or `[infrared]` adds what the model has not; `sonar = false` takes it away. `at` is where the table stands, and `elsewhere`
     /// names the keys that somebody else reads. Gives nothing when there is a mistake, and all mistakes.
     pub fn read(table: &Table, at: Span, elsewhere: &[&str], mistakes: &mut Vec<Mistake>) -> Option<Model> {
         let before = mistakes.len();
@@ -43,6 +45,8 @@ impl Model {
         optional(&mut reader, "sonar", &mut model.sonar, mistakes);
         optional(&mut reader, "laser", &mut model.laser, mistakes);
         optional(&mut reader, "camera", &mut model.camera, mistakes);
+        optional(&mut reader, "landmarks", &mut model.landmarks, mistakes);
+        optional(&mut reader, "infrared", &mut model.infrared, mistakes);
         reader.finish(mistakes);
         (mistakes.len() == before).then_some(model)
     }
@@ -107,6 +111,12 @@ fn set_angle(reader: &mut TableReader<'_>, key: &str, least: f64, most: f64, val
             reader.report(Mistake::new(entry.at, what));
         }
         None => reader.report(not_an_angle(key, entry)),
+    }
+}
+
+fn set_truth(reader: &mut TableReader<'_>, key: &str, value: &mut bool) {
+    if let Some(truth) = reader.bool(key) {
+        *value = truth;
     }
 }
 
@@ -197,6 +207,32 @@ impl Part for Laser {
         set(r, "max_range", 0.01, 1000.0, &mut self.max_range);
         set(r, "noise", 0.0, 1.0, &mut self.noise);
         set(r, "dropout", 0.0, 1.0, &mut self.dropout);
+        set_period(r, "period", &mut self.period);
+    }
+}
+
+impl Part for LandmarkSensor {
+    fn read(&mut self, r: &mut TableReader<'_>) {
+        set_angle(r, "field", 0.0, TAU, &mut self.field);
+        set_truth(r, "on_head", &mut self.on_head);
+        set(r, "height", 0.0, 5.0, &mut self.height);
+        set(r, "min_range", 0.0, 100.0, &mut self.min_range);
+        set(r, "max_range", 0.01, 100.0, &mut self.max_range);
+        set(r, "relative_noise", 0.0, 1.0, &mut self.relative_noise);
+        set(r, "noise", 0.0, 10.0, &mut self.noise);
+        set_angle(r, "bearing_noise", 0.0, PI, &mut self.bearing_noise);
+        set_truth(r, "identifies", &mut self.identifies);
+        set(r, "miss", 0.0, 1.0, &mut self.miss);
+        set(r, "mistake", 0.0, 1.0, &mut self.mistake);
+        set_period(r, "period", &mut self.period);
+    }
+}
+
+impl Part for Infrared {
+    fn read(&mut self, r: &mut TableReader<'_>) {
+        set(r, "height", 0.0, 5.0, &mut self.height);
+        set(r, "max_range", 0.01, 100.0, &mut self.max_range);
+        set(r, "miss", 0.0, 1.0, &mut self.miss);
         set_period(r, "period", &mut self.period);
     }
 }

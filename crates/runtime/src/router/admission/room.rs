@@ -47,6 +47,12 @@ impl Longer {
     }
 }
 
+/// A name as it is typed into a shell.
+fn typed(name: &str) -> String {
+    let is_plain = |c: char| c.is_ascii_alphanumeric() || "._-".contains(c);
+    if name.chars().all(is_plain) { name.to_owned() } else { format!("'{}'", name.replace('\'', r"'\''")) }
+}
+
 fn people(span: Duration) -> String {
     if span >= Duration::secs(1) {
         format!("{} s", span.seconds())
@@ -55,28 +61,36 @@ fn people(span: Duration) -> String {
     }
 }
 
-impl std::fmt::Display for Room {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+impl Room {
+    fn sentence(&self) -> String {
         let mut said: Vec<String> = self.longer.iter().take(NAMED).map(Longer::said).collect();
         let more = self.longer.len().saturating_sub(NAMED);
         said.extend((more > 0).then(|| format!("{more} more slower")));
-        let (last, first) = said.split_last().map_or(("", &[][..]), |(last, first)| (last.as_str(), first));
-        let and = if first.is_empty() { "" } else { " and " };
-        write!(f, "with {}{and}{last}", first.join(", "))?;
+        match said.split_last() {
+            Some((last, first)) if !first.is_empty() => format!("with {} and {last}", first.join(", ")),
+            _ => format!("with {}", said.concat()),
+        }
+    }
+
+    /// What sets it, as it is typed; nothing where no option reaches an agent.
+    fn command(&self) -> Option<String> {
+        let each = |say: &dyn Fn(&Longer) -> String| self.longer.iter().map(say).collect::<Vec<_>>();
         if self.runs {
-            let set = |longer: &Longer| format!("set {} {}={}", longer.agent, longer.key, longer.span);
-            let all: Vec<String> = self.longer.iter().map(set).collect();
-            // Between the requests stands a word of its own, which a shell takes for its own where it is not quoted.
-            return write!(f, ": sinew {}", all.join(" ';' "));
+            let set = |it: &Longer| format!("set {} {}={}", typed(&it.agent), it.key, it.span);
+            // Between two requests stands a word that a shell takes for its own where it is not quoted.
+            return Some(format!("sinew {}", each(&set).join(" ';' ")));
         }
         // Agents of a group are written in a file of their own.
-        if self.longer.iter().all(|longer| !longer.agent.contains('.')) {
-            let set =
-                |longer: &Longer| format!("--set agent.{}.{}={}", longer.agent, longer.key, longer.span);
-            let all: Vec<String> = self.longer.iter().map(set).collect();
-            write!(f, ": {}", all.join(" "))?;
-        }
-        Ok(())
+        let is_reached = |it: &Longer| !it.agent.contains('.') && typed(&it.agent) == it.agent;
+        let set = |it: &Longer| format!("--set agent.{}.{}={}", it.agent, it.key, it.span);
+        self.longer.iter().all(is_reached).then(|| each(&set).join(" "))
+    }
+}
+
+impl std::fmt::Display for Room {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.write_str(&self.sentence())?;
+        self.command().map_or(Ok(()), |command| write!(f, ": {command}"))
     }
 }
 
@@ -115,7 +129,8 @@ impl Router {
         let (present, longest) = match agent.period {
             Some(period) => (Some(exact(period)), agent.period_range.map(|(_, longest)| longest)),
             None => {
-                let streams = judged.of.found[at].streams.iter();
+                // What it asks for itself goes on as it is.
+                let streams = judged.of.found[at].streams.iter().filter(|stream| stream.after.is_some());
                 (streams.map(|stream| stream.period.ceil()).min(), giving.gap_max)
             }
         };

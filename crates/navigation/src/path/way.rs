@@ -1,7 +1,7 @@
 //! A way over a grid.
 
+use super::cost::length;
 use super::grid::Cell;
-use super::length;
 
 /// A way from cell to neighbouring cell. The memory for the longest is taken when it is made.
 #[derive(Clone, Debug)]
@@ -82,10 +82,23 @@ impl Path {
         }
     }
 
-    /// Becomes the first `count` cells of another.
-    pub(super) fn begin_as(&mut self, other: &Path, count: usize) {
-        self.clear();
-        other.cells.iter().take(count).for_each(|cell| self.go(*cell));
+    /// The same, but straight as far as that is to go, then aslant.
+    pub(super) fn walk_straight_first(&mut self, to: Cell) {
+        let Some(last) = self.cells.last().copied() else { return };
+        let (dx, dy) = (last.x.abs_diff(to.x), last.y.abs_diff(to.y));
+        let toward = |from: u32, to: u32, by: u32| if from < to { from + by } else { from - by };
+        let turn = if dx > dy {
+            Cell::new(toward(last.x, to.x, dx - dy), last.y)
+        } else {
+            Cell::new(last.x, toward(last.y, to.y, dy - dx))
+        };
+        self.walk(turn);
+        self.walk(to);
+    }
+
+    /// Leads the other way.
+    pub(super) fn reverse(&mut self) {
+        self.cells.reverse();
     }
 }
 

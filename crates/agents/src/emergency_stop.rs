@@ -1,0 +1,311 @@
+//! EmergencyStop: ramps the robot down when it comes closer to something than it can still stop before, and lets it go when the way is clear.
+//!
+//! ```text
+//!  scan, ranges ──▶ way ahead along the arc ─┐
+//!  odometry, wish ─▶ where it drives ────────┴▶ critical range? ──▶ bound ──▶ reflex of the drive
+//!  bumper ──▶ told as a hard stop                                   (the latch itself is set by the driver)
+//! ```
+//!
+//! It only slows and stops: its bound goes past the coordinator, to the drive, whoever drives in whatever mode. The law is
+//! [`motion::stopping`].
+
+use motion::stopping::{Parameters, Stopping, Verdict, way_to};
+use runtime::{Agent, Fault, Input, Output, Step};
+use types::messages::{Bumper, EmergencyStop, LaserScan, Odometry, Ranges, StopKind, Twist};
+use types::params::Params;
+use types::{Duration, Point, Pose, Time};
+
+use crate::shared::{Dated, echoes};
+
+/// The body, and how it brakes.
+#[derive(Clone, Debug, Params)]
+pub struct StopParams {
+    /// Radius of the body (m): of one that is not round, that of the circle around it. 0.34 is that of the reactive layer's robot.
+    #[param(default = 0.34, min = 0.01, max = 5.0)]
+    pub radius: f64,
+    /// Room kept beside the body (m).
+    #[param(default = 0.02, min = 0.0, max = 1.0)]
+    pub side_margin: f64,
+    /// From seeing something to the answer of the wheels (s). 0.2 is a scan at 10 Hz, a step of the drive and the lag of the motors.
+    #[param(default = 0.2, min = 0.0, max = 5.0)]
+    pub reaction: f64,
+    /// How hard the ramp brakes (m/s²); no harder than the drive can. 1 does not tip a tall body.
+    #[param(default = 1.0, min = 0.05, max = 20.0)]
+    pub deceleration: f64,
+    /// What is left of the way after stopping (m).
+    #[param(default = 0.1, min = 0.0, max = 5.0)]
+    pub margin: f64,
+    /// How much more way than critical it must be before it lets go (m).
+    #[param(default = 0.1, min = 0.0, max = 5.0)]
+    pub release: f64,
+    /// For how long that must be so (s): who moves in front of it shall not make it stutter.
+    #[param(default = 0.3, min = 0.0, max = 60.0)]
+    pub calm: f64,
+    /// From standing it lets go when there is as much way as this speed needs (m/s).
+    #[param(default = 0.1, min = 0.0, max = 5.0)]
+    pub least: f64,
+    /// Readings older than this are none, and who does not see stops (time). 350 ms are two missed scans at 10 Hz.
+    #[param(default = Duration::millis(350), min = 0.01, max = 60.0)]
+    pub stale: Duration,
+}
+
+impl StopParams {
+    fn law(&self) -> Parameters {
+        Parameters {
+            radius: self.radius + self.side_margin,
+            reaction: self.reaction,
+            deceleration: self.deceleration,
+            margin: self.margin,
+            release: self.release,
+            calm: self.calm,
+            least: self.least,
+        }
+    }
+}
+
+/// Bounds the motion when something comes nearer than the critical range, by a ramp, and lets go by itself.
+#[derive(Agent)]
+#[agent(kind = "emergency-stop")]
+pub struct EmergencyStopAction {
+    /// What is ahead, from a laser.
+    #[robot("scan")]
+    scan: Input<LaserScan>,
+    /// What is around, from sonars or whatever measures ranges.
+    ranges: Input<Ranges>,
+    /// How the robot moves.
+    odometry: Input<Odometry>,
+    /// How it is about to move: from standing that says which way must be clear.
+    wish: Input<Twist>,
+    /// Whether it touches something.
+    #[robot("bumper")]
+    bumper: Input<Bumper>,
+    /// The most that may be driven, for the drive's reflex; silent while the way is clear.
+    bound: Output<Twist>,
+    /// What it makes of the way ahead.
+    #[port(history = 64)]
+    stop: Output<EmergencyStop>,
+    params: StopParams,
+    guard: Guard,
+}
+
+impl Agent for EmergencyStopAction {
+    fn step(&mut self, step: &mut Step) -> Result<(), Fault> {
+        let now = step.now;
+        if let Some(scan) = self.scan.newest() {
+            self.guard.look(&scan, scan.row(), scan.header().stamp);
+        }
+        if let Some(ranges) = self.ranges.newest() {
+            self.guard.hear(&ranges, ranges.header().stamp);
+        }
+        if let Some(odometry) = self.odometry.latest() {
+            self.guard.motion = odometry.twist;
+        }
+        if let Some(wish) = self.wish.latest() {
+            self.guard.wish = wish;
+        }
+        if let Some(bumper) = self.bumper.latest() {
+            self.guard.touched = bumper.pressed();
+        }
+        let sees = [self.scan.is_wired(), self.ranges.is_wired()];
+        let told = self.guard.judge(&self.params, sees, now);
+        if told.kind == StopKind::Soft && !self.guard.told {
+            runtime::note!(
+                "critical range: {} m ahead at {} m/s, {} m are needed",
+                told.ahead,
+                told.speed,
+                told.critical
+            );
+        }
+        self.guard.told = told.kind == StopKind::Soft;
+        if told.allowed.is_finite() {
+            // It may turn away on the spot.
+            self.bound.send(Twist::new(told.allowed, ANY));
+        }
+        self.stop.send(told);
+        Ok(())
+    }
+}
+
+/// More than anything turns (rad/s).
+const ANY: f64 = 1e3;
+/// The most points that are looked at.
+const POINTS: usize = 4096 + 64;
+/// Slower than this it stands, and the wish says where to (m/s).
+const STANDING: f64 = 0.02;
+
+#[derive(Debug)]
+struct Guard {
+    /// What a scan showed, from the robot's middle, and when. Its memory is taken when the agent is made.
+    seen: Vec<Point>,
+    seen_at: Option<Time>,
+    heard: Option<Dated<Ranges>>,
+    motion: Twist,
+    wish: Twist,
+    touched: bool,
+    told: bool,
+    forward: Stopping,
+    backward: Stopping,
+    last: Option<Time>,
+}
+
+impl Default for Guard {
+    fn default() -> Guard {
+        Guard {
+            seen: Vec::with_capacity(POINTS),
+            seen_at: None,
+            heard: None,
+            motion: Twist::ZERO,
+            wish: Twist::ZERO,
+            touched: false,
+            told: false,
+            forward: Stopping::new(Parameters::default()),
+            backward: Stopping::new(Parameters::default()),
+            last: None,
+        }
+    }
+}
+
+impl Guard {
+    fn look(&mut self, scan: &LaserScan, row: &[f32], stamp: Time) {
+        let mount = Pose::new(scan.mount_x.into(), scan.mount_y.into(), scan.mount_heading.into());
+        self.seen.clear();
+        self.seen_at = Some(stamp);
+        for (i, range) in row.iter().enumerate().take(POINTS) {
+            // A range that is no number is a beam that did not come back; the longest is a way that is free.
+            if *range > scan.range_min && *range < scan.range_max {
+                let bearing = f64::from(scan.angle_min) + i as f64 * f64::from(scan.angle_step);
+                self.seen.push(mount.transform(Point::polar((*range).into(), bearing)));
+            }
+        }
+    }
+
+    fn hear(&mut self, ranges: &Ranges, stamp: Time) {
+        self.heard = Some(Dated { value: *ranges, stamp });
+    }
+
+    /// The way ahead while moving so, from the robot's middle; nothing where one of those who are wired has not seen lately.
+    fn ahead(&self, params: &StopParams, twist: Twist, [scans, hears]: [bool; 2], now: Time) -> Option<f64> {
+        let is_fresh = |stamp: Time| now - stamp <= params.stale;
+        let radius = params.radius + params.side_margin;
+        if scans && !self.seen_at.is_some_and(is_fresh) || !(scans || hears) {
+            return None;
+        }
+        let way = |x: f64, y: f64| way_to(radius, twist, x, y);
+        let seen = if scans { &self.seen[..] } else { &[] };
+        let mut ahead = seen.iter().fold(f64::INFINITY, |least, point| least.min(way(point.x, point.y)));
+        if hears {
+            let ranges = Dated::fresh(&self.heard, now, params.stale)?;
+            for (bearing, range) in echoes(&ranges) {
+                let point = Point::polar(range, bearing);
+                ahead = ahead.min(way(point.x, point.y));
+            }
+        }
+        Some(ahead)
+    }
+
+    fn judge(&mut self, params: &StopParams, sees: [bool; 2], now: Time) -> EmergencyStop {
+        let dt = self.last.replace(now).map_or(0.0, |last| (now - last).seconds());
+        let stands = self.motion.linear.abs() < STANDING;
+        let turn = if stands { self.wish.angular } else { self.motion.angular };
+        let is_back = if stands { self.wish.linear < 0.0 } else { self.motion.linear < 0.0 };
+        let step = |is_way: bool, sign: f64, stopping: &mut Stopping| {
+            stopping.set_parameters(params.law());
+            let speed = if is_way { self.motion.linear.abs() } else { 0.0 };
+            // On the spot it meets nothing; the way that counts is that of setting off.
+            let along = sign * speed.max(params.least.max(STANDING));
+            let ahead = self.ahead(params, Twist::new(along, turn), sees, now);
+            (stopping.step(ahead, Twist::new(sign * speed, turn), dt), ahead.is_none())
+        };
+        let (mut forward, mut backward) = (self.forward, self.backward);
+        let ahead = step(!is_back, 1.0, &mut forward);
+        let behind = step(is_back, -1.0, &mut backward);
+        (self.forward, self.backward) = (forward, backward);
+        let (Verdict { stopping, allowed, ahead, critical }, blind) = if is_back { behind } else { ahead };
+        let kind = match (self.touched, stopping) {
+            (true, _) => StopKind::Hard,
+            (false, true) => StopKind::Soft,
+            (false, false) => StopKind::None,
+        };
+        let allowed = if self.touched { 0.0 } else { allowed };
+        EmergencyStop { kind, blind, ahead, critical, allowed, speed: self.motion.linear }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const LASER: [bool; 2] = [true, false];
+
+    fn at(millis: i64) -> Time {
+        Time::ZERO + Duration::millis(millis)
+    }
+
+    /// A wall `distance` ahead of the laser, which sits 0.2 m ahead of the middle.
+    fn scan(distance: f32) -> (LaserScan, Vec<f32>) {
+        let head = LaserScan {
+            angle_min: -0.5,
+            angle_step: 0.1,
+            range_min: 0.05,
+            range_max: 8.0,
+            mount_x: 0.2,
+            ..LaserScan::default()
+        };
+        let row = (0..11).map(|i| distance / (-0.5f32 + 0.1 * i as f32).cos()).collect();
+        (head, row)
+    }
+
+    fn looking(distance: f32, stamp: Time) -> Guard {
+        let mut guard = Guard::default();
+        let (head, row) = scan(distance);
+        guard.look(&head, &row, stamp);
+        guard
+    }
+
+    #[test]
+    fn a_wall_within_the_critical_range_ramps_it_down_and_a_farther_one_does_not() {
+        let params = StopParams::default();
+        // At 0.3 m/s: 0.06 + 0.045 + 0.1 = 0.205 m from the rim at 0.36 m, so 0.365 m from the laser.
+        for (distance, expected) in [(0.37, StopKind::None), (0.36, StopKind::Soft)] {
+            let mut guard = looking(distance, at(0));
+            guard.motion = Twist::new(0.3, 0.0);
+            let told = guard.judge(&params, LASER, at(0));
+            assert_eq!(told.kind, expected, "{distance}: {told:?}");
+            assert!((told.critical - 0.205).abs() < 1e-9 && !told.blind);
+            assert!((told.ahead - (f64::from(distance) + 0.2 - 0.36)).abs() < 1e-3, "{told:?}");
+        }
+    }
+
+    #[test]
+    fn it_may_back_off_from_what_it_stopped_for() {
+        let params = StopParams::default();
+        let mut guard = looking(0.2, at(0));
+        assert_eq!(guard.judge(&params, LASER, at(0)).kind, StopKind::Soft);
+        guard.wish = Twist::new(-0.2, 0.0);
+        let told = guard.judge(&params, LASER, at(20));
+        assert_eq!((told.kind, told.allowed), (StopKind::None, f64::INFINITY));
+        guard.wish = Twist::new(0.2, 0.0);
+        assert_eq!(guard.judge(&params, LASER, at(40)).allowed, 0.0, "but not go on");
+    }
+
+    #[test]
+    fn a_stale_sensor_is_an_obstacle_and_so_is_none_at_all() {
+        let params = StopParams::default();
+        let mut guard = looking(5.0, at(0));
+        guard.motion = Twist::new(0.3, 0.0);
+        assert_eq!(guard.judge(&params, LASER, at(350)).kind, StopKind::None);
+        let told = guard.judge(&params, LASER, at(351));
+        assert_eq!((told.kind, told.blind, told.ahead), (StopKind::Soft, true, 0.0));
+        let both = looking(5.0, at(0)).judge(&params, [true, true], at(0));
+        assert!(both.blind, "the sonars that are wired were not heard");
+        assert!(Guard::default().judge(&params, [false, false], at(0)).blind);
+    }
+
+    #[test]
+    fn a_touch_is_told_as_a_hard_stop() {
+        let mut guard = looking(5.0, at(0));
+        guard.touched = true;
+        let told = guard.judge(&StopParams::default(), LASER, at(0));
+        assert_eq!((told.kind, told.allowed), (StopKind::Hard, 0.0));
+    }
+}

@@ -1,0 +1,235 @@
+//! Move: a velocity for a time, a distance, an angle; by a profile, with the loop closed over the wheels.
+
+use motion::manoeuvre::{self, Manoeuvre, Move, Outcome};
+use motion::profile::Bounds;
+use runtime::{Agent, Fault, Input, Output, Step};
+use types::messages::{Mode, Motion, Odometry, Offer, Progress, Report, Task, Twist};
+use types::params::Params;
+use types::value::{Mistake, Table};
+use types::{Text, Time};
+
+use crate::action::{Duty, NOTHING, bounded, offer};
+
+/// What a motion may do.
+#[derive(Clone, Debug, Params)]
+#[params(check = whole)]
+pub struct MoveParams {
+    /// How the speed grows and falls: "trapezoid", at once with full acceleration, or "s-curve", which bounds the jerk as well and does not let a tall body nod.
+    #[param(default = "s-curve")]
+    pub profile: Text<12>,
+    /// Highest speed (m/s). 0.5 is a slow walk.
+    #[param(default = 0.5, min = 0.01, max = 10.0)]
+    pub linear_max: f64,
+    /// Acceleration (m/s²). 0.5 starts without slip on a smooth floor.
+    #[param(default = 0.5, min = 0.01, max = 20.0)]
+    pub acceleration: f64,
+    /// Jerk (m/s³): 2 is at full acceleration after a quarter of a second.
+    #[param(default = 2.0, min = 0.01, max = 1000.0)]
+    pub jerk: f64,
+    /// Highest turn rate (rad/s).
+    #[param(default = 1.0, min = 0.01, max = 20.0)]
+    pub angular_max: f64,
+    /// Angular acceleration (rad/s²). Less than what the drive can do, so that corrections have room.
+    #[param(default = 2.0, min = 0.01, max = 100.0)]
+    pub angular_acceleration: f64,
+    /// Angular jerk (rad/s³).
+    #[param(default = 8.0, min = 0.01, max = 10000.0)]
+    pub angular_jerk: f64,
+    /// Lag of the drive (s): commands lead by what it loses.
+    #[param(default = 0.0, min = 0.0, max = 1.0)]
+    pub lag: f64,
+    /// A way is done within this of its end (m).
+    #[param(default = 0.005, min = 0.0005, max = 1.0)]
+    pub near: f64,
+    /// And within this of its heading (rad).
+    #[param(default = 0.01, min = 0.001, max = 1.0)]
+    pub aligned: f64,
+    /// Farther behind the plan than this (m, or rad of a turn) something holds it.
+    #[param(default = 0.2, min = 0.01, max = 5.0)]
+    pub lag_max: f64,
+}
+
+fn whole(params: &MoveParams, read: &Table) -> Vec<Mistake> {
+    let known = ["trapezoid", "s-curve"].contains(&params.profile.as_str());
+    let entry = read.get("profile").filter(|_| !known);
+    let wrong = entry.map(|entry| Mistake::new(entry.at, "\"profile\" is \"trapezoid\" or \"s-curve\""));
+    wrong.into_iter().collect()
+}
+
+impl MoveParams {
+    fn parameters(&self, task: &Task) -> manoeuvre::Parameters {
+        let jerk = |jerk: f64| if self.profile.as_str() == "trapezoid" { f64::INFINITY } else { jerk };
+        // A timed velocity is driven as it is said: too fast a one is refused, not slowed.
+        let asked = |speed: f64| if task.motion == Motion::Velocity { 0.0 } else { speed.abs() };
+        manoeuvre::Parameters {
+            linear: Bounds {
+                velocity: bounded(self.linear_max, asked(task.linear)),
+                acceleration: self.acceleration,
+                jerk: jerk(self.jerk),
+            },
+            angular: Bounds {
+                velocity: bounded(self.angular_max, asked(task.angular)),
+                acceleration: self.angular_acceleration,
+                jerk: jerk(self.angular_jerk),
+            },
+            lag: self.lag,
+            near: self.near,
+            aligned: self.aligned,
+            lag_max: self.lag_max,
+            ..manoeuvre::Parameters::default()
+        }
+    }
+}
+
+/// Drives the manoeuvre of its task, and tells when it is done or something holds it.
+#[derive(Agent)]
+#[agent(kind = "move")]
+pub struct MoveAction {
+    /// Whether it is heard.
+    mode: Input<Mode>,
+    /// What to drive.
+    task: Input<Task>,
+    /// Where the robot is by its wheels.
+    odometry: Input<Odometry>,
+    /// How it wishes to drive.
+    drive: Output<Offer>,
+    /// How far it has come.
+    #[port(history = 64)]
+    report: Output<Report>,
+    params: MoveParams,
+    duty: Duty,
+    manoeuvre: Option<Manoeuvre>,
+    /// Odometry as one reading gave it: what is held to a plan must not be predicted from the plan's own commands.
+    measured: Option<Odometry>,
+}
+
+impl Agent for MoveAction {
+    fn step(&mut self, step: &mut Step) -> Result<(), Fault> {
+        let now = step.now;
+        self.duty.listen(&mut self.mode, &mut self.task);
+        self.measured = self.odometry.latest().or(self.measured);
+        let task = self.duty.task(step.name_of(step.agent).unwrap_or_default().as_str());
+        let task =
+            task.filter(|task| matches!(task.motion, Motion::Velocity | Motion::Distance | Motion::Turn));
+        let (is_new, dt) = (self.duty.is_new(task.as_ref(), now), self.duty.dt(now));
+        let Some(task) = task else {
+            self.manoeuvre = None;
+            self.report.send(NOTHING);
+            return Ok(());
+        };
+        if is_new {
+            self.manoeuvre = begin(&self.params, &task);
+        }
+        let (twist, report) = self.advance(&task, dt, now);
+        self.drive.send(offer(twist, now));
+        self.report.send(report);
+        Ok(())
+    }
+}
+
+fn begin(params: &MoveParams, task: &Task) -> Option<Manoeuvre> {
+    let wanted = match task.motion {
+        Motion::Distance => Move::Distance(task.distance),
+        Motion::Turn => Move::Turn(task.angle),
+        _ => Move::Velocity { twist: Twist::new(task.linear, task.angular), seconds: task.seconds },
+    };
+    Manoeuvre::new(params.parameters(task), wanted).ok()
+}
+
+impl MoveAction {
+    fn advance(&mut self, task: &Task, dt: f64, now: Time) -> (Twist, Report) {
+        let seconds = self.duty.seconds(now);
+        let report = Report { task: task.number, progress: Progress::Underway, seconds, ..Report::default() };
+        let Some(manoeuvre) = &mut self.manoeuvre else {
+            return (Twist::ZERO, Report { progress: Progress::Refused, ..report });
+        };
+        let Some(measured) = self.measured else { return (Twist::ZERO, report) };
+        let gone = manoeuvre.step(measured.pose, dt);
+        let is_late = task.motion != Motion::Velocity && task.seconds > 0.0 && seconds > task.seconds;
+        let progress = match gone.outcome {
+            Outcome::Running if is_late => Progress::TimedOut,
+            Outcome::Running => Progress::Underway,
+            Outcome::Done => Progress::Arrived,
+            Outcome::Missed | Outcome::Blocked => Progress::Unreachable,
+            Outcome::Lost => Progress::Lost,
+        };
+        let twist = if progress == Progress::TimedOut { Twist::ZERO } else { gone.twist };
+        let distance = gone.error.position().norm();
+        (twist, Report { progress, distance, angle: gone.error.heading, ..report })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use types::{Duration, Pose};
+
+    /// Drives a body that follows at once; gives where it ends, how, and the greatest speed.
+    fn driven(params: &MoveParams, task: Task) -> (Pose, Progress, f64) {
+        let mut agent = MoveAction { params: params.clone(), ..blank() };
+        agent.manoeuvre = begin(params, &task);
+        let (mut body, mut fastest) = (Pose::default(), 0.0_f64);
+        for i in 0..3000 {
+            let now = Time::ZERO + Duration::millis(20 * i);
+            agent.duty.is_new(Some(&task), now);
+            agent.measured = Some(Odometry { pose: body, ..Odometry::default() });
+            let (twist, report) = agent.advance(&task, 0.02, now);
+            if report.progress.is_over() {
+                return (body, report.progress, fastest);
+            }
+            fastest = fastest.max(twist.linear.abs());
+            body = body.advanced(twist.linear, twist.angular, 0.02);
+        }
+        panic!("it does not end: {body:?}");
+    }
+
+    fn blank() -> MoveAction {
+        MoveAction {
+            mode: Default::default(),
+            task: Default::default(),
+            odometry: Default::default(),
+            drive: Default::default(),
+            report: Default::default(),
+            params: MoveParams::default(),
+            duty: Duty::default(),
+            manoeuvre: None,
+            measured: None,
+        }
+    }
+
+    #[test]
+    fn distances_angles_and_timed_velocities_end_where_they_should() {
+        for profile in ["trapezoid", "s-curve"] {
+            let params = MoveParams { profile: profile.into(), ..MoveParams::default() };
+            let task = Task { number: 1, ..Task::default() };
+            let (end, how, fastest) =
+                driven(&params, Task { motion: Motion::Distance, distance: 1.0, linear: 0.2, ..task });
+            assert_eq!(how, Progress::Arrived, "{profile}");
+            assert!((end.x - 1.0).abs() < 0.006 && end.y.abs() < 0.006, "{profile}: {end:?}");
+            assert!(fastest < 0.2 * 1.2 + 1e-9, "{profile}: {fastest}");
+            let (end, how, _) = driven(&params, Task { motion: Motion::Turn, angle: -1.5, ..task });
+            assert_eq!(how, Progress::Arrived, "{profile}");
+            assert!((end.heading + 1.5).abs() < 0.011, "{profile}: {end:?}");
+            // 30 cm/s and 15 °/s for 4 s are 1.2 m and 60° of a circle of 1.146 m.
+            let turn = 15f64.to_radians();
+            let velocity =
+                Task { motion: Motion::Velocity, linear: 0.3, angular: turn, seconds: 4.0, ..task };
+            let (end, how, _) = driven(&params, velocity);
+            assert_eq!(how, Progress::Arrived, "{profile}");
+            assert!((end.heading - 4.0 * turn).abs() < 0.02, "{profile}: {end:?}");
+        }
+    }
+
+    #[test]
+    fn what_cannot_be_driven_is_refused_and_what_is_held_is_told() {
+        let fast = Task { number: 1, motion: Motion::Velocity, linear: 2.0, seconds: 1.0, ..Task::default() };
+        assert_eq!(driven(&MoveParams::default(), fast).1, Progress::Refused);
+        let params = MoveParams::default();
+        let task = Task { number: 1, motion: Motion::Distance, distance: 2.0, ..Task::default() };
+        let mut agent = MoveAction { manoeuvre: begin(&params, &task), ..blank() };
+        agent.measured = Some(Odometry::default());
+        let held =
+            (0..500).map(|i| agent.advance(&task, 0.02, Time::ZERO + Duration::millis(20 * i)).1.progress);
+        assert_eq!(held.last(), Some(Progress::Unreachable));
+    }
+}

@@ -1,0 +1,255 @@
+//! The path follower: along a planned path, by regulated pure pursuit.
+
+use motion::track::{self, Mode as Following, Track};
+use runtime::{Agent, Fault, Input, Output, Step};
+use types::messages::{
+    Mode, Motion, Odometry, Offer, Path, Progress, Report, Safety, Task, Twist, WAYPOINTS,
+};
+use types::params::Params;
+use types::{Point, Pose, Sequence};
+
+use crate::action::{Duty, NOTHING, Whereabouts, bounded, limits, offer};
+use crate::odometry::ODOM;
+use crate::shared::Dated;
+
+/// How to follow.
+#[derive(Clone, Debug, Params)]
+pub struct FollowerParams {
+    /// Speed where nothing asks for less (m/s). 0.4 is a slow walk.
+    #[param(default = 0.4, min = 0.02, max = 10.0)]
+    pub speed: f64,
+    /// Highest turn rate (rad/s).
+    #[param(default = 1.0, min = 0.05, max = 20.0)]
+    pub angular_max: f64,
+    /// Highest change of speed (m/s²).
+    #[param(default = 0.5, min = 0.01, max = 20.0)]
+    pub acceleration: f64,
+    /// Highest change of the turn rate (rad/s²).
+    #[param(default = 3.0, min = 0.01, max = 100.0)]
+    pub angular_acceleration: f64,
+    /// How far ahead it looks (s). 1.5 s at 0.4 m/s is 0.6 m, a body's length.
+    #[param(default = 1.5, min = 0.1, max = 10.0)]
+    pub lookahead: f64,
+    /// It looks ahead at least so far (m): less, and it swings.
+    #[param(default = 0.3, min = 0.05, max = 5.0)]
+    pub lookahead_least: f64,
+    /// It looks ahead at most so far (m): more, and it cuts doors.
+    #[param(default = 0.9, min = 0.1, max = 10.0)]
+    pub lookahead_most: f64,
+    /// In curves of a smaller radius than this it slows (m).
+    #[param(default = 0.9, min = 0.0, max = 10.0)]
+    pub curve_radius: f64,
+    /// What is nearer to the rim than this slows it (m).
+    #[param(default = 0.5, min = 0.0, max = 5.0)]
+    pub proximity: f64,
+    /// Within this of the end of the path it is there (m).
+    #[param(default = 0.02, min = 0.002, max = 2.0)]
+    pub near: f64,
+    /// The end of the path counts as the goal within this of it (m): a goal that stands in something is neared only so far, and that is told as unreachable.
+    #[param(default = 0.15, min = 0.01, max = 5.0)]
+    pub goal_near: f64,
+}
+
+impl FollowerParams {
+    fn parameters(&self, task: &Task) -> track::Parameters {
+        let speed = bounded(self.speed, task.linear);
+        let angular_max = bounded(self.angular_max, task.angular);
+        let limits = limits(speed, angular_max, self.acceleration, self.angular_acceleration);
+        track::Parameters {
+            speed,
+            lookahead: self.lookahead,
+            lookahead_within: (self.lookahead_least, self.lookahead_most.max(self.lookahead_least)),
+            radius: self.curve_radius,
+            proximity: self.proximity,
+            near: self.near,
+            ..track::Parameters::new(limits)
+        }
+    }
+}
+
+/// Follows the newest path of the planner while its task is to go along one, and tells when it is at the goal.
+#[derive(Agent)]
+#[agent(kind = "path-follower")]
+pub struct PathFollower {
+    /// Whether it is heard.
+    mode: Input<Mode>,
+    /// Where to.
+    task: Input<Task>,
+    /// The way there.
+    path: Input<Path>,
+    /// Where the robot is by its wheels.
+    odometry: Input<Odometry>,
+    /// Where it is on the map, from the localizer; for paths on the map.
+    pose: Input<Odometry>,
+    /// How near is what is nearest.
+    safety: Input<Safety>,
+    /// How it wishes to drive.
+    drive: Output<Offer>,
+    /// How far it has come.
+    #[port(history = 64)]
+    report: Output<Report>,
+    params: FollowerParams,
+    duty: Duty,
+    way: Way,
+}
+
+impl Agent for PathFollower {
+    fn step(&mut self, step: &mut Step) -> Result<(), Fault> {
+        let now = step.now;
+        self.duty.listen(&mut self.mode, &mut self.task);
+        self.way.place.listen(&mut self.odometry, &mut self.pose, now);
+        if let Some(safety) = self.safety.latest() {
+            self.way.clearance = Some(Dated { value: safety.nearest, stamp: now });
+        }
+        let task = self.duty.task(step.name_of(step.agent).unwrap_or_default().as_str());
+        let task = task.filter(|task| task.motion == Motion::Path);
+        let (is_new, dt) = (self.duty.is_new(task.as_ref(), now), self.duty.dt(now));
+        if is_new {
+            // A path to another goal leads elsewhere.
+            self.way.path = None;
+        }
+        while let Some(path) = self.path.take() {
+            if task.is_some() {
+                self.way.change(&self.params, &path, task.as_ref());
+            }
+        }
+        let Some(task) = task else {
+            self.report.send(NOTHING);
+            return Ok(());
+        };
+        let (twist, report) = self.way.advance(&self.params, &task, self.duty.seconds(now), dt);
+        self.drive.send(offer(twist, now));
+        self.report.send(report);
+        Ok(())
+    }
+}
+
+/// The path, and how far the robot is on it.
+#[derive(Clone, Copy, Debug, Default)]
+struct Way {
+    place: Whereabouts,
+    clearance: Option<Dated<f64>>,
+    path: Option<(Track, Path, Sequence<Point, WAYPOINTS>)>,
+    last: Twist,
+}
+
+impl Way {
+    fn change(&mut self, params: &FollowerParams, path: &Path, task: Option<&Task>) {
+        let Some(task) = task else { return };
+        if !path.found {
+            self.path = None;
+            return;
+        }
+        let points = path.points.iter().map(|point| Point::from(*point)).collect();
+        self.path = Some((Track::new(params.parameters(task), self.last), *path, points));
+    }
+
+    /// Where the robot is, in the frame of the path.
+    fn here(&self, path: &Path) -> Option<Pose> {
+        let odometry = self.place.odometry?.pose;
+        if path.frame.as_str() == ODOM {
+            Some(odometry)
+        } else {
+            Some(self.place.map_from_odometry?.then(odometry))
+        }
+    }
+
+    /// The goal of a task, in the frame of the path.
+    fn goal(&self, path: &Path, task: &Task) -> Point {
+        let goal = task.target.position();
+        if path.frame == task.frame || task.frame.is_empty() {
+            return goal;
+        }
+        self.place.map_from_odometry.map_or(goal, |map| map.inverse().transform(goal))
+    }
+
+    fn advance(&mut self, params: &FollowerParams, task: &Task, seconds: f64, dt: f64) -> (Twist, Report) {
+        let report = Report { task: task.number, progress: Progress::Underway, seconds, ..Report::default() };
+        if task.seconds > 0.0 && seconds > task.seconds {
+            self.last = Twist::ZERO;
+            return (Twist::ZERO, Report { progress: Progress::TimedOut, ..report });
+        }
+        let clearance = self.clearance.map_or(f64::INFINITY, |near| near.value.max(0.0));
+        let Some((mut track, path, points)) = self.path else {
+            self.last = Twist::ZERO;
+            return (Twist::ZERO, report);
+        };
+        let Some(here) = self.here(&path) else {
+            self.last = Twist::ZERO;
+            return (Twist::ZERO, Report { progress: Progress::Lost, ..report });
+        };
+        let gone = track.step(&points, here, clearance, dt);
+        self.path = Some((track, path, points));
+        self.last = gone.twist;
+        let left = here.position().distance(self.goal(&path, task));
+        let progress = match gone.mode {
+            // A path that was cut goes on with the next.
+            Following::Arrived if path.cut => Progress::Underway,
+            Following::Arrived if left > params.goal_near => Progress::Unreachable,
+            Following::Arrived => Progress::Arrived,
+            _ => Progress::Underway,
+        };
+        (gone.twist, Report { progress, distance: left, ..report })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn path(points: &[(f64, f64)]) -> Path {
+        let points = points.iter().map(|(x, y)| Point::new(*x, *y).into()).collect();
+        Path { frame: ODOM.into(), found: true, points, quality: 1.0, ..Path::default() }
+    }
+
+    fn to(x: f64, y: f64) -> Task {
+        let target = Pose::new(x, y, 0.0);
+        Task { number: 1, motion: Motion::Path, frame: ODOM.into(), target, ..Task::default() }
+    }
+
+    fn driven(way: &mut Way, task: &Task) -> (Pose, Report) {
+        let (params, mut body, mut last) = (FollowerParams::default(), Pose::default(), Report::default());
+        for i in 0..5000 {
+            way.place.odometry = Some(Odometry { pose: body, ..Odometry::default() });
+            let (twist, report) = way.advance(&params, task, 0.02 * f64::from(i), 0.02);
+            last = report;
+            if report.progress.is_over() {
+                break;
+            }
+            body = body.advanced(twist.linear, twist.angular, 0.02);
+        }
+        (body, last)
+    }
+
+    #[test]
+    fn it_follows_a_path_to_its_end() {
+        let (params, task) = (FollowerParams::default(), to(2.0, 2.0));
+        let mut way = Way::default();
+        way.change(&params, &path(&[(0.0, 0.0), (2.0, 0.0), (2.0, 2.0)]), Some(&task));
+        let (end, report) = driven(&mut way, &task);
+        assert_eq!(report.progress, Progress::Arrived);
+        assert!(end.position().distance(Point::new(2.0, 2.0)) < 0.05, "{end:?}");
+    }
+
+    #[test]
+    fn a_path_that_ends_elsewhere_does_not_reach_the_goal_and_one_that_is_cut_goes_on() {
+        let (params, task) = (FollowerParams::default(), to(2.0, 0.0));
+        let mut way = Way::default();
+        way.change(&params, &path(&[(0.0, 0.0), (1.0, 0.0)]), Some(&task));
+        assert_eq!(driven(&mut way, &task).1.progress, Progress::Unreachable);
+        let mut way = Way::default();
+        way.change(&params, &Path { cut: true, ..path(&[(0.0, 0.0), (1.0, 0.0)]) }, Some(&task));
+        assert_eq!(driven(&mut way, &task).1.progress, Progress::Underway);
+    }
+
+    #[test]
+    fn without_a_path_it_stands_and_waits_until_its_time_is_over() {
+        let (params, task) = (FollowerParams::default(), Task { seconds: 3.0, ..to(2.0, 0.0) });
+        let mut way = Way::default();
+        way.change(&params, &Path { found: false, ..path(&[]) }, Some(&task));
+        way.place.odometry = Some(Odometry::default());
+        let (twist, report) = way.advance(&params, &task, 2.9, 0.02);
+        assert_eq!((twist, report.progress), (Twist::ZERO, Progress::Underway));
+        assert_eq!(way.advance(&params, &task, 3.1, 0.02).1.progress, Progress::TimedOut);
+    }
+}

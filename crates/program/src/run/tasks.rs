@@ -1,0 +1,98 @@
+//! What became of the tasks of the reactive layer, for the summary.
+
+use serde_json::{Value as Json, json};
+use types::messages::Progress;
+
+use crate::figures::TaskOutcome;
+
+/// One row for each, in the order in which they ended.
+pub(super) fn document(tasks: &[TaskOutcome]) -> Json {
+    let row = |task: &TaskOutcome| {
+        json!({
+            "task": task.task, "ended": task.last.progress.word(), "at_s": task.at,
+            "took_s": task.last.seconds, "left_m": task.last.distance, "left_rad": task.last.angle,
+            "off_m": task.off,
+        })
+    };
+    tasks.iter().map(row).collect()
+}
+
+/// More tasks than this are counted by how they ended.
+const SHOWN: usize = 24;
+
+/// The same for people.
+pub(super) fn text(tasks: &[TaskOutcome]) -> Vec<String> {
+    let named = |i: usize, what: String| format!("  {:<12} {what}", if i == 0 { "tasks" } else { "" });
+    if tasks.len() > SHOWN {
+        let mut words: Vec<&str> = tasks.iter().map(|task| task.last.progress.word()).collect();
+        words.sort_unstable();
+        words.dedup();
+        let count = |word: &str| tasks.iter().filter(|task| task.last.progress.word() == word).count();
+        let told: Vec<String> = words.iter().map(|word| format!("{} {word}", count(word))).collect();
+        return [told.join(", ")]
+            .into_iter()
+            .chain(errors(tasks))
+            .enumerate()
+            .map(|(i, what)| named(i, what))
+            .collect();
+    }
+    let line = |task: &TaskOutcome| {
+        let last = &task.last;
+        let left = format!("{:.3} m and {:.1}° left", last.distance, last.angle.to_degrees());
+        let left = match task.off {
+            Some(off) => format!("{left}, in truth {off:.3} m"),
+            None => left,
+        };
+        format!(
+            "{:>2} {:<12} at {:.2} s after {:.2} s, {left}",
+            task.task,
+            last.progress.word(),
+            task.at,
+            last.seconds
+        )
+    };
+    tasks.iter().enumerate().map(|(i, task)| named(i, line(task))).collect()
+}
+
+/// How far those that arrived truly were from their places.
+fn errors(tasks: &[TaskOutcome]) -> Option<String> {
+    let arrived = tasks.iter().filter(|task| task.last.progress == Progress::Arrived);
+    let mut off: Vec<f64> = arrived.filter_map(|task| task.off).collect();
+    off.sort_by(f64::total_cmp);
+    let at = |share: f64| off[((off.len() - 1) as f64 * share).round() as usize] * 1e3;
+    (!off.is_empty()).then(|| {
+        format!(
+            "off in truth by {:.1} mm (median), {:.1} mm (99 %), {:.1} mm (most)",
+            at(0.5),
+            at(0.99),
+            at(1.0)
+        )
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use types::messages::Report;
+
+    fn ended(task: u32, progress: Progress) -> TaskOutcome {
+        let last = Report { task, progress, distance: 0.0071, angle: 0.01, seconds: 9.5 };
+        TaskOutcome { task, at: 12.5, last, off: Some(0.004) }
+    }
+
+    #[test]
+    fn each_task_is_told_and_many_are_counted() {
+        let few = [ended(1, Progress::Arrived), ended(2, Progress::TimedOut)];
+        let told = text(&few);
+        assert_eq!(told.len(), 2);
+        assert!(told[0].starts_with("  tasks ") && told[0].contains("arrived"), "{told:?}");
+        assert!(told[1].contains("timed out") && told[1].contains("0.007 m and 0.6° left"), "{told:?}");
+        assert_eq!(document(&few)[1]["ended"], "timed out");
+        let many: Vec<_> = (0..30).map(|i| ended(i, Progress::Arrived)).chain(few).collect();
+        let expected = [
+            "  tasks        31 arrived, 1 timed out",
+            "               off in truth by 4.0 mm (median), 4.0 mm (99 %), 4.0 mm (most)",
+        ];
+        assert_eq!(text(&many), expected);
+    }
+}
