@@ -92,6 +92,19 @@ pub trait Distances {
         self.nearest(at).map(|nearest| nearest.distance * nearest.distance)
     }
 
+    /// What is nearest to the end of a beam in a direction of length one, of all that it can have met: not the far side of a wall. A field that
+    /// knows no sides tells what is nearest.
+    fn met(&self, at: Point, direction: Point) -> Option<Nearest> {
+        let _ = direction;
+        self.nearest(at)
+    }
+
+    /// The square of the distance to that (m²).
+    fn met_square(&self, at: Point, direction: Point) -> Option<f64> {
+        let _ = direction;
+        self.square(at)
+    }
+
     /// The lower left and the upper right corner of what the field covers (m).
     fn bounds(&self) -> (Point, Point);
 
@@ -128,7 +141,7 @@ impl FloorPlan {
         let blocks = self.walls.iter().filter_map(Wall::block).chain(self.boxes.iter().copied());
         for block in blocks {
             let corners = block.corners();
-            out.extend((0..4).map(|i| Element::segment(corners[i], corners[(i + 1) % 4])));
+            out.extend((0..4).map(|i| Element::side(corners[i], corners[(i + 1) % 4])));
         }
         let thin = self.walls.iter().filter(|wall| wall.thickness <= 0.0);
         out.extend(thin.map(|wall| Element::segment(wall.from, wall.to)));

@@ -159,11 +159,11 @@ impl<F: Distances> Localiser<F> {
         outcome
     }
 
-    /// For a while no scan came. Dead reckoning goes on.
+    /// For so long no scan came that the robot is lost. Dead reckoning goes on, as a hint for the search when scans come again.
     pub fn silence(&mut self, odometry: Pose) {
         let moved = self.moved(odometry);
         self.predict(odometry, moved);
-        self.miss(Outcome::Stuck);
+        (self.state, self.is_fixed) = (State::Lost, false);
     }
 
     /// Takes a pose that somebody else has measured for the time of the last scan, with the inverse of its covariance. Gives whether it was

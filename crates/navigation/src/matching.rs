@@ -181,14 +181,6 @@ pub fn match_carefully(
     }
 }
 
-/// The share of the points of a scan that lie on something of the plan when it was taken at a pose, from 0 to 1.
-pub fn inliers(floor: &impl Distances, scan: &Scan, pose: Pose, within: f64) -> f64 {
-    let near = |beam: &&Beam| {
-        floor.nearest(pose.transform(beam.end)).is_some_and(|nearest| nearest.distance <= within)
-    };
-    scan.beams().iter().filter(near).count() as f64 / scan.beams().len().max(1) as f64
-}
-
 /// The normal equations of one round.
 #[derive(Clone, Copy, Debug, Default)]
 struct Normal {
@@ -210,9 +202,10 @@ impl Normal {
         let widest = limit * limit / (params.cut * params.cut);
         for beam in scan.beams() {
             let arm = turn(beam.end);
-            let Some(nearest) = floor.nearest(pose.position() + arm) else { continue };
+            let direction = turn(beam.direction);
+            let Some(nearest) = floor.met(pose.position() + arm, direction) else { continue };
             normal.inliers += u32::from(nearest.distance <= params.inlier);
-            let along = params.noise * nearest.away.dot(turn(beam.direction));
+            let along = params.noise * nearest.away.dot(direction);
             let var = along * along + params.plan_noise * params.plan_noise;
             let square = nearest.distance * nearest.distance;
             let off = square / (params.cut * params.cut * var.max(widest));

@@ -207,9 +207,10 @@ impl MonteCarlo {
         let most = self.params.cut * self.params.cut / 2.0;
         let (s, c) = sincos(pose.heading);
         let off = |beam: &Beam| {
-            let Point { x, y } = beam.end;
-            let end = Point::new(pose.x + c * x - s * y, pose.y + s * x + c * y);
-            floor.square(end).map_or(most, |square| (square * scale).min(most))
+            let turn = |p: Point| Point::new(c * p.x - s * p.y, s * p.x + c * p.y);
+            floor
+                .met_square(pose.position() + turn(beam.end), turn(beam.direction))
+                .map_or(most, |square| (square * scale).min(most))
         };
         let sum: f64 = self.beams.iter().map(off).sum();
         exp(-self.params.worth / self.beams.len().max(1) as f64 * sum)

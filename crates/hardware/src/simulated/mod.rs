@@ -7,7 +7,6 @@
 //!
 //! What the judge knows leaves through [`Truth`] alone; no output of a robot carries it.
 
-mod hand;
 mod hands;
 mod truth;
 mod world;
@@ -23,7 +22,6 @@ use types::messages::{
 };
 use types::{Duration, Name, Pose, Time};
 
-pub use hand::Hand;
 pub use hands::{Hands, SERVICES, World as WorldAgent, services};
 pub use truth::{PersonMoment, RobotMoment, Truth};
 use world::World;
@@ -269,8 +267,7 @@ fn empty_image(model: &Model) -> Image {
     }
 }
 
-/// Only drivers of the same world take this lock, and drivers live on the gates' thread: no ordinary thread can hold it. (A [`Hand`] does, in
-/// simulated time.)
+/// Only drivers of the same world take this lock, and drivers live on the gates' thread: no ordinary thread can hold it.
 fn locked(world: &Mutex<World>) -> MutexGuard<'_, World> {
     // The world of a robot whose step panicked goes on for the others.
     world.lock().unwrap_or_else(PoisonError::into_inner)

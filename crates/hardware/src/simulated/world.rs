@@ -1,9 +1,8 @@
 //! The world that several drivers share.
 
 use sim::camera::Canvas;
-use sim::simulator::AddError;
 use sim::{Goal, PHYSICS_STEP, Progress, RobotId, Simulator, WorldPlan};
-use types::{Duration, Pose, Time};
+use types::{Duration, Time};
 
 use super::truth::{Moment, Truth, truth};
 use super::{Robot, SetupError};
@@ -115,12 +114,6 @@ impl World {
         self.simulator.command_wheels(id, left, right);
     }
 
-    pub(super) fn put(&mut self, id: RobotId, pose: Pose) -> Result<(), AddError> {
-        self.simulator.put(id, pose)?;
-        self.publish();
-        Ok(())
-    }
-
     pub(super) fn command_head(&mut self, id: RobotId, pan: f64, tilt: f64) {
         self.simulator.command_head(id, pan, tilt);
     }
@@ -136,6 +129,7 @@ impl World {
 #[cfg(test)]
 mod tests {
     use sim::Model;
+    use types::Pose;
 
     use super::*;
 

@@ -8,9 +8,9 @@ use super::Nearest;
 /// What is seen of a floor is made of these.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) enum Element {
-    /// A line from a point on, in a direction of length one.
-    Segment { from: Point, along: Point, length: f64 },
-    /// A circle, seen from both sides.
+    /// A line from a point on, in a direction of length one. One that bounds a body has that on its left, and is seen from its right alone.
+    Segment { from: Point, along: Point, length: f64, bounds: bool },
+    /// A circle, seen from outside.
     Circle { centre: Point, radius: f64 },
 }
 
@@ -18,21 +18,51 @@ pub(super) enum Element {
 const ON_IT: f64 = 1e-9;
 
 impl Element {
+    /// A side of a body that lies on its left.
+    pub(super) fn side(from: Point, to: Point) -> Element {
+        match Element::segment(from, to) {
+            Element::Segment { from, along, length, .. } => {
+                Element::Segment { from, along, length, bounds: true }
+            }
+            circle => circle,
+        }
+    }
+
     pub(super) fn segment(from: Point, to: Point) -> Element {
         let length = from.distance(to);
         let along = if length > 0.0 { (to - from) * (1.0 / length) } else { Point::new(1.0, 0.0) };
-        Element::Segment { from, along, length }
+        Element::Segment { from, along, length, bounds: false }
     }
 
     pub(super) fn circle(centre: Point, radius: f64) -> Element {
         Element::Circle { centre, radius }
     }
 
+    /// Whether a beam that ends at a point can have met it: not the far side of a body.
+    #[inline]
+    pub(super) fn is_met(&self, at: Point, direction: Point) -> bool {
+        match *self {
+            Element::Segment { along, bounds, .. } => !bounds || along.cross(direction) > 0.0,
+            Element::Circle { centre, .. } => direction.dot(at - centre) <= 0.0,
+        }
+    }
+
+    /// Whether it and another are sides of bodies that look in opposite directions.
+    pub(super) fn is_opposite(&self, other: &Element) -> bool {
+        match (self, other) {
+            (
+                Element::Segment { along: a, bounds: true, .. },
+                Element::Segment { along: b, bounds: true, .. },
+            ) => a.dot(*b) < -0.5,
+            _ => false,
+        }
+    }
+
     /// From the nearest place on it to a point (m).
     #[inline]
     fn offset(&self, at: Point) -> Point {
         match *self {
-            Element::Segment { from, along, length } => {
+            Element::Segment { from, along, length, .. } => {
                 let off = at - from;
                 off - along * off.dot(along).clamp(0.0, length)
             }
@@ -77,7 +107,7 @@ impl Element {
     /// How far a ray goes before it meets it (m).
     pub(super) fn cast(&self, origin: Point, direction: Point) -> Option<f64> {
         match *self {
-            Element::Segment { from, along, length } => {
+            Element::Segment { from, along, length, .. } => {
                 let slant = direction.cross(along);
                 if fabs(slant) < 1e-12 {
                     return None;
@@ -100,7 +130,7 @@ impl Element {
     /// The corners of the smallest upright rectangle around it.
     pub(super) fn bounds(&self) -> (Point, Point) {
         let (a, b, room) = match *self {
-            Element::Segment { from, along, length } => (from, from + along * length, 0.0),
+            Element::Segment { from, along, length, .. } => (from, from + along * length, 0.0),
             Element::Circle { centre, radius } => (centre, centre, radius),
         };
         let low = Point::new(a.x.min(b.x) - room, a.y.min(b.y) - room);

@@ -9,12 +9,14 @@ use super::{Distances, FloorPlan, Nearest};
 
 /// Side of a cell where the floor is not too large for it (m). A cell of 0.1 m beside a wall has one element to look at, or two.
 const CELL: f64 = 0.1;
-/// So many cells a field has at most, 8 bytes each; on a larger floor the cells are larger. A million are 100 m by 100 m.
+/// So many cells a field has at most, 12 bytes each; on a larger floor the cells are larger. A million are 100 m by 100 m.
 const CELLS_MOST: f64 = 1_048_576.0;
 /// So far from what stands there a field tells what is nearest (m): farther off nothing that was seen can be meant.
 const REACH: f64 = 1.0;
-/// So many elements can be the nearest within one cell. More than four need a star of corners within a tenth of a metre.
-const RIVALS: usize = 4;
+/// So many elements can be the nearest within one cell, the far sides of walls among them. More need a star of corners within a tenth of a metre.
+const RIVALS: usize = 6;
+/// The two sides of a wall are told apart up to this thickness (m); behind the near side of a thicker one nothing is met.
+const THICK: f64 = 0.2;
 /// The number that names no element.
 const NONE: u16 = u16::MAX;
 /// So many elements a plan may have.
@@ -35,10 +37,10 @@ impl core::fmt::Display for TooManyElements {
 
 impl core::error::Error for TooManyElements {}
 
-/// How far any point is from what a plan shows: exact, up to one metre off. Where more than four elements meet within one cell, the
+/// How far any point is from what a plan shows: exact, up to one metre off. Where more than six elements meet within one cell, the
 /// distance can be too large there, by at most the diagonal of the cell.
 ///
-/// All memory is taken when it is made: 8 bytes for each cell of 0.1 m, at most 8 MB, and 40 bytes for each line.
+/// All memory is taken when it is made: 12 bytes for each cell of 0.1 m, at most 12 MB, and 40 bytes for each line.
 #[derive(Clone, Debug)]
 pub struct PlanField {
     plan: FloorPlan,
@@ -105,15 +107,20 @@ impl PlanField {
         }
         let begin = stack.len();
         for i in of {
-            if distance(stack[i], &self.elements) <= least + 2.0 * far + 1e-9 {
+            if distance(stack[i], &self.elements) <= least + THICK + 2.0 * far + 1e-9 {
                 stack.push(stack[i]);
             }
         }
         if side == 1 {
             let elements = &self.elements;
             stack[begin..].sort_by(|a, b| distance(*a, elements).total_cmp(&distance(*b, elements)));
+            let first = stack[begin];
+            let near = |one: &&u16| {
+                distance(**one, elements) <= least + 2.0 * far + 1e-9
+                    || elements[usize::from(**one)].is_opposite(&elements[usize::from(first)])
+            };
             let place = &mut self.rivals[(y * self.width + x) as usize];
-            place.iter_mut().zip(&stack[begin..]).for_each(|(place, one)| *place = *one);
+            place.iter_mut().zip(stack[begin..].iter().filter(near)).for_each(|(place, one)| *place = *one);
         } else {
             let (end, half) = (stack.len(), side / 2);
             for (dx, dy) in [(0, 0), (half, 0), (0, half), (half, half)] {
@@ -121,6 +128,14 @@ impl PlanField {
             }
         }
         stack.truncate(begin);
+    }
+
+    /// What a beam that ends here can have met, with the square of the distance (m²).
+    #[inline]
+    fn met_by(&self, at: Point, direction: Point) -> impl Iterator<Item = (f64, &Element)> {
+        let rivals = self.rivals(at).into_iter().flatten().take_while(|one| **one != NONE);
+        let elements = rivals.map(|one| &self.elements[usize::from(*one)]);
+        elements.filter(move |one| one.is_met(at, direction)).map(move |one| (one.square(at), one))
     }
 
     #[inline]
@@ -166,6 +181,23 @@ impl Distances for PlanField {
         let rivals = self.rivals(at)?.iter().take_while(|one| **one != NONE);
         let least =
             rivals.map(|one| self.elements[usize::from(*one)].square(at)).fold(f64::INFINITY, f64::min);
+        (least <= REACH * REACH).then_some(least)
+    }
+
+    #[inline]
+    fn met(&self, at: Point, direction: Point) -> Option<Nearest> {
+        let met = self.met_by(at, direction);
+        let (least, best) =
+            met.fold(
+                (f64::INFINITY, None),
+                |best, (square, one)| if square < best.0 { (square, Some(one)) } else { best },
+            );
+        best.filter(|_| least <= REACH * REACH).map(|one| one.nearest(at))
+    }
+
+    #[inline]
+    fn met_square(&self, at: Point, direction: Point) -> Option<f64> {
+        let least = self.met_by(at, direction).map(|(square, _)| square).fold(f64::INFINITY, f64::min);
         (least <= REACH * REACH).then_some(least)
     }
 

@@ -1,12 +1,13 @@
 //! Places that fit, followed from scan to scan until one is left.
 
-use types::Pose;
+use libm::sincos;
 use types::geometry::wrap;
+use types::{Point, Pose};
 
 use super::{Fix, LocaliserParams};
 use crate::floor::Distances;
 use crate::linear::{Matrix, ZERO};
-use crate::matching::{Scan, match_carefully};
+use crate::matching::{Beam, Scan, match_carefully};
 
 /// So many places are followed at most.
 pub const MOST_PLACES: usize = 8;
@@ -74,10 +75,11 @@ impl Place {
 
 /// How well a scan fits (nats, not positive).
 fn evidence(floor: &impl Distances, scan: &Scan, pose: Pose) -> f64 {
-    let off = |end| {
-        floor.square(pose.transform(end)).map_or(MOST, |square| (square / (2.0 * NOISE * NOISE)).min(MOST))
-    };
-    let sum: f64 = scan.beams().iter().map(|beam| off(beam.end)).sum();
+    let (s, c) = sincos(pose.heading);
+    let turn = |p: Point| Point::new(c * p.x - s * p.y, s * p.x + c * p.y);
+    let met = |beam: &Beam| floor.met_square(pose.position() + turn(beam.end), turn(beam.direction));
+    let off = |beam: &Beam| met(beam).map_or(MOST, |square| (square / (2.0 * NOISE * NOISE)).min(MOST));
+    let sum: f64 = scan.beams().iter().map(off).sum();
     -WORTH * sum / scan.beams().len().max(1) as f64
 }
 

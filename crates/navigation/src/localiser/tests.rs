@@ -156,6 +156,21 @@ fn a_laser_that_is_stuck_is_noticed_when_the_robot_moves() {
 }
 
 #[test]
+fn without_scans_it_is_lost_and_found_where_its_wheels_took_it() {
+    let floor = floor();
+    let mut roamer = Roamer::new(&floor, Pose::new(2.0, 2.5, 0.3), 1);
+    let mut localiser = localiser(&floor, 1);
+    put(&mut localiser, &roamer, roamer.pose);
+    for _ in 0..5 {
+        roamer.go();
+    }
+    localiser.silence(roamer.odometry);
+    assert_eq!((localiser.state(), localiser.pose(), localiser.fix()), (State::Lost, None, None));
+    let found = (0..40).find(|_| go(&mut localiser, &mut roamer) == Outcome::Fixed);
+    assert!(found.is_some() && off(&localiser, &roamer) < 0.02, "{found:?}");
+}
+
+#[test]
 fn without_returns_it_goes_on_by_its_wheels_until_they_may_be_too_far_off() {
     let floor = floor();
     let mut roamer = Roamer::new(&floor, Pose::new(2.0, 2.5, 0.3), 1);
