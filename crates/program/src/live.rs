@@ -182,10 +182,16 @@ fn failure(error: ClientError) -> Failure {
 const LONGEST_CALL_WAITS: HostDuration = HostDuration::from_nanos(control::protocol::LONGEST_CALL.0 as u64)
     .saturating_add(HostDuration::from_secs(5));
 
+/// Whether the words of a command say all, without a system: those that carry a message need the type of its port.
+fn is_whole(verb: &str) -> bool {
+    let changes = control::words::CHANGES.iter().any(|usage| usage.verb == verb);
+    changes && !crate::file::calls::VERBS.contains(&verb)
+}
+
 fn said(verb: &str, words: &[String], which: &Which, forced: bool, json: bool) -> Result<ExitCode, Failure> {
     let first = forced.then_some("force").into_iter().chain([verb]).map(str::to_owned);
     let all: Vec<String> = first.chain(words.iter().cloned()).collect();
-    if control::words::CHANGES.iter().any(|usage| usage.verb == verb) && verb != "send" {
+    if is_whole(verb) {
         // What is wrong in the words alone is told without a system.
         control::words::parse(&all)?;
     }

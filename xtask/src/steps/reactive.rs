@@ -2,6 +2,7 @@
 
 use serde_json::Value;
 
+use super::live::Running;
 use super::sinew;
 use crate::failure::Failure;
 use crate::tool::Tool;
@@ -41,6 +42,7 @@ pub(super) fn run(workspace: &Workspace, program: &std::path::Path) -> Result<St
     if let Some(name) = FIGURES.iter().find(|name| !out.join(format!("{name}.png")).is_file()) {
         return Err(Failure::new(format!("reactive: there is no figure {name}.png"), REMEDY));
     }
+    calls(workspace, program)?;
     let out = workspace.fresh_scratch("goals")?;
     let random = format!("agent.tour.random={GOALS}");
     let words = ["run", "goals", "--set", &random, "--for", "7h", "--json", "--out"];
@@ -49,6 +51,31 @@ pub(super) fn run(workspace: &Workspace, program: &std::path::Path) -> Result<St
     // Its log is of more than a gigabyte.
     let _ = std::fs::remove_dir_all(&out);
     Ok(format!("reactive, {GOALS} goals at most {:.0} mm off", most * 1e3))
+}
+
+/// What people ask of a robot that runs, on the command line.
+fn calls(workspace: &Workspace, program: &std::path::Path) -> Result<(), Failure> {
+    let folder = workspace.fresh_scratch("calls")?;
+    let words = ["reactive", "--clock", "wall", "--for", "60s", "--no-log"];
+    let running = Running::start(program, &folder, &words, REMEDY)?;
+    let asked: [(&[&str], bool); 7] = [
+        (&["call", "navigation.go", "x=3", "y=3"], true),
+        (&["call", "navigation.go", "xx=3"], false),
+        (&["call", "navigation.come", "x=3"], false),
+        (&["call", "world.add", "name=wall", "x=6", "y=1", "length=0.2", "width=1"], true),
+        (&["call", "processes.change", "name=idle"], true),
+        (&["graph"], true),
+        (&["quit"], true),
+    ];
+    let wrong = asked.iter().find(|(words, expected)| running.ask(words) != *expected);
+    running.end()?;
+    match wrong {
+        None => Ok(()),
+        Some((words, expected)) => {
+            let what = if *expected { "was refused" } else { "was not refused" };
+            Err(Failure::new(format!("reactive: \"sinew {}\" {what}", words.join(" ")), REMEDY))
+        }
+    }
 }
 
 const REMEDY: &str = "Look at it: cargo run --release -- run reactive, and run goals; their figures lie in the folders that the summaries name.";
