@@ -34,6 +34,7 @@ pub fn schema(registry: &Registry) -> Json {
         compare_,
         at_,
         figure_,
+        for_,
     ] = SECTIONS;
     let properties = object([
         (name, json!({"type": "string", "description": "The name of the system."})),
@@ -69,6 +70,7 @@ pub fn schema(registry: &Registry) -> Json {
                 "description": "An entry of the plan with several values, whose runs are shown one above the other."}),
         ),
         (at_, json!({"type": "array", "items": request(), "description": "Timed requests and faults."})),
+        (for_, time("How long a run lasts in simulated time, where there is no goal.")),
         (
             figure_,
             json!({"type": "array", "items": figure(), "description": "Parts of the run that are drawn by themselves."}),

@@ -12,7 +12,7 @@
 //! | TOML to a tree of values | `tree` |
 //! | built-in scenarios and worlds, and files by name | `library` |
 //! | `--set KEY=VALUE` | `set` |
-//! | the tree to a plan, with all mistakes | `read`, with `agent`, `group`, `wires`, `decide`, `modes`, `figure`, `knowledge`, `requests`, `calls` |
+//! | the tree to a plan, with all mistakes | `read`, with `agent`, `group`, `wires`, `decide`, `modes`, `figure`, `lasting`, `knowledge`, `requests`, `calls` |
 //! | the plan to a text | `write` |
 
 mod agent;
@@ -24,6 +24,7 @@ mod figure;
 mod floor;
 mod group;
 pub(crate) mod knowledge;
+mod lasting;
 mod library;
 mod modes;
 mod read;
@@ -39,6 +40,7 @@ pub(crate) use burden::{as_declared, burdens, processors};
 pub(crate) use compare::compared;
 pub(crate) use decide::read_alone;
 pub(crate) use figure::{Part, figures};
+pub(crate) use lasting::lasting;
 pub use library::{Found, Shelf};
 pub(crate) use read::SECTIONS;
 pub use read::{Loaded, check, load, read, read_plan};

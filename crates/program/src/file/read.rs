@@ -16,10 +16,10 @@ use super::group::Names;
 use super::library::Shelf;
 use super::sources::{Mistakes, Sources};
 use super::wires::Written;
-use super::{burden, compare, decide, figure, floor, knowledge, modes, set, tree};
+use super::{burden, compare, decide, figure, floor, knowledge, lasting, modes, set, tree};
 
 /// The sections of a system file.
-pub(crate) const SECTIONS: [&str; 17] = [
+pub(crate) const SECTIONS: [&str; 18] = [
     "name",
     "world",
     "processors",
@@ -37,6 +37,7 @@ pub(crate) const SECTIONS: [&str; 17] = [
     "compare",
     "at",
     "figure",
+    "for",
 ];
 /// Longer than anything that robots do. Several such times can be added and each taken four times without an overflow.
 const LONGEST: Duration = Duration::secs(10 * 365 * 24 * 3600);
@@ -212,6 +213,7 @@ impl<'r> Reader<'r> {
         burden::read(self, tree);
         compare::read(self, tree);
         figure::read(self, tree);
+        lasting::read(self, tree);
         knowledge::read(self, tree);
         self.read_world(tree);
         floor::read(self);

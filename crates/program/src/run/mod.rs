@@ -306,7 +306,8 @@ impl One<'_> {
         let recorded =
             ready.robots.iter().any(|robot| robot.description.clock == hardware::ClockKind::Recorded);
         let usual = (self.clock == ClockChoice::Sim && !recorded).then_some(WITHOUT_GOAL);
-        self.args.limit.or(of_goal).or(usual)
+        let of_plan = file::lasting(&ready.plan).filter(|_| self.clock == ClockChoice::Sim);
+        self.args.limit.or(of_goal).or(of_plan).or(usual)
     }
 
     fn speed(&self) -> Option<f64> {
