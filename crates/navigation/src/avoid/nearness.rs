@@ -19,7 +19,7 @@ use types::geometry::{PI, wrap};
 use types::messages::{Avoidance, Situation, Twist};
 
 use super::body::Body;
-use super::regions::{Chosen, Passage, Regions, turn};
+use super::regions::{Chosen, Passage, Regions, Side, turn};
 use super::sectors::{SECTORS, Sectors, bearing};
 
 /// How the robot avoids.
@@ -74,6 +74,7 @@ impl Parameters {
 pub struct NearnessDiagram {
     parameters: Parameters,
     regions: Regions,
+    side: Side,
     /// From the turning point to the edge, a sector: E.
     edges: [f64; SECTORS],
     /// Security distance, a sector: d_s.
@@ -103,6 +104,7 @@ impl NearnessDiagram {
         NearnessDiagram {
             parameters,
             regions: Regions::new(),
+            side: Side::default(),
             edges: std::array::from_fn(|i| parameters.body.edge(bearing(i))),
             security: std::array::from_fn(security),
         }
@@ -138,15 +140,20 @@ impl NearnessDiagram {
         }
         let passage = self.passage();
         self.regions.find(distances, &passage);
-        match self.regions.choose(distances, goal, &passage) {
+        match self.regions.choose(distances, goal, &passage, self.side) {
             Some(chosen) => self.act(distances, &chosen, seen),
             None => Avoidance { situation: Situation::NoWay, ..seen },
         }
     }
 
+    /// Forgets on which side it goes round what is in the way: for another goal another one may be better.
+    pub fn forget(&mut self) {
+        self.side = Side::default();
+    }
+
     fn passage(&self) -> Passage {
         let Parameters { passage, reach, security_front, body, .. } = self.parameters;
-        Passage { width: passage, horizon: reach + 2.0 * body.half_width(), security: security_front }
+        Passage { width: passage, horizon: reach + body.half_width(), security: security_front }
     }
 
     /// A round body may turn with something at its edge; a rectangular one may not.
@@ -163,9 +170,10 @@ impl NearnessDiagram {
     }
 
     /// The motion into the chosen region.
-    fn act(&self, distances: &[f64; SECTORS], chosen: &Chosen, seen: Avoidance) -> Avoidance {
+    fn act(&mut self, distances: &[f64; SECTORS], chosen: &Chosen, seen: Avoidance) -> Avoidance {
         let (left, right) = self.dangers(distances, chosen.free);
         let situation = situation(chosen, left, right);
+        self.side.keep(chosen, situation == Situation::HighSafetyGoalInRegion);
         let wanted = match situation {
             Situation::LowSafetyOneSide | Situation::LowSafetyGoalInRegion => {
                 let near = if left.ratio < 1.0 { left } else { right };

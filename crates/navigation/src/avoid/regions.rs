@@ -2,7 +2,7 @@
 
 use libm::{atan2, fabs, fmax, fmin, sincos};
 use types::Point;
-use types::geometry::wrap;
+use types::geometry::{TAU, wrap};
 
 use super::sectors::{SECTOR, SECTORS, bearing, sector};
 
@@ -11,7 +11,7 @@ use super::sectors::{SECTOR, SECTORS, bearing, sector};
 pub(super) struct Passage {
     /// Width of the smallest passage (m): w_min.
     pub(super) width: f64,
-    /// What is farther from the turning point is not looked at (m): d_max + 2R.
+    /// What is farther from the turning point is not looked at (m).
     pub(super) horizon: f64,
     /// Room kept to the obstacle that makes an edge (m).
     pub(super) security: f64,
@@ -38,6 +38,39 @@ pub(super) struct Chosen {
     pub(super) goal_in: bool,
     /// Where to if nothing is near (rad).
     pub(super) free: f64,
+    /// The side of the goal on which it is entered: 1 for the left, −1 for the right.
+    pub(super) side: f64,
+}
+
+/// So much nearer to the goal the way on the other side must be before it is taken instead (rad).
+///
+/// Two ways round a thing are equally good before its middle, and there the noise of the sensor would choose anew at each step. 30° are
+/// fifteen sectors: more than an edge moves by noise, or by what the robot drives before it has turned away.
+pub(super) const MARGIN: f64 = types::geometry::PI / 6.0;
+
+/// On which side of the goal the robot goes round what is in its way, while it does.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub(super) struct Side(Option<f64>);
+
+impl Side {
+    /// How far an edge is from the goal (rad), by the angle at which it lies to the left of it.
+    ///
+    /// On the other side than the one kept to it counts the margin more; but whoever goes on round gets there as well.
+    fn distance(self, edge: f64) -> f64 {
+        match self.0 {
+            Some(side) if side * edge < 0.0 => fmin(fabs(edge) + MARGIN, TAU - fabs(edge)),
+            _ => fabs(edge),
+        }
+    }
+
+    /// Keeps to what was chosen; `safe` tells that nothing is near.
+    pub(super) fn keep(&mut self, chosen: &Chosen, safe: bool) {
+        if !chosen.goal_in {
+            self.0 = Some(chosen.side);
+        } else if safe {
+            self.0 = None;
+        }
+    }
 }
 
 impl Region {
@@ -99,10 +132,12 @@ impl Regions {
     /// The regions of a reading.
     pub(super) fn find(&mut self, distances: &[f64; SECTORS], passage: &Passage) {
         for i in 0..SECTORS {
-            self.nearness[i] = fmax(passage.horizon - distances[i], 0.0);
+            // What is looked at at all is nearer than nothing by more than a passage: whatever shuts a way has an edge beside which there may
+            // be another.
+            self.nearness[i] = fmax(passage.horizon + passage.width - distances[i], 0.0);
             let (sine, cosine) = self.directions[i];
-            // What is infinitely far gives no point that is asked for.
-            let range = fmin(distances[i], 1e9);
+            // What is too far away gives no point that is asked for.
+            let range = if distances[i] < passage.horizon { distances[i] } else { 1e9 };
             self.points[i] = Point::new(range * cosine, range * sine);
         }
         self.count = 0;
@@ -142,6 +177,7 @@ impl Regions {
         distances: &[f64; SECTORS],
         goal: Point,
         passage: &Passage,
+        side: Side,
     ) -> Option<Chosen> {
         let goal_bearing = atan2(goal.y, goal.x);
         let goal_sector = sector(goal_bearing);
@@ -149,10 +185,10 @@ impl Regions {
         let mut asked = -1.0;
         loop {
             let to_goal = |region: &Region| {
-                let chosen = Chosen { region: *region, goal_in: true, free: goal_bearing };
+                let chosen = Chosen { region: *region, goal_in: true, free: goal_bearing, side: 0.0 };
                 region.holds(goal_sector).then_some((0.0, chosen, goal))
             };
-            let by_edge = |i: usize| self.by_edge(i, distances, goal_bearing, passage);
+            let by_edge = |i: usize| self.by_edge(i, distances, goal_bearing, passage, side);
             let (score, chosen, target) = (0..self.count)
                 .flat_map(|i| [to_goal(&self.found[i]), by_edge(i)])
                 .flatten()
@@ -172,18 +208,24 @@ impl Regions {
         distances: &[f64; SECTORS],
         goal_bearing: f64,
         passage: &Passage,
+        side: Side,
     ) -> Option<(f64, Chosen, Point)> {
         let region = self.found[index];
-        let (obstacle, border, inwards) = rising_edge(&region, goal_bearing)?;
+        let (obstacle, border, inwards) = rising_edge(&region, goal_bearing, side)?;
         let distance = distances[obstacle];
         let free = if region.is_wide() {
             wrap(bearing(obstacle) + inwards * atan2(passage.width / 2.0 + passage.security, distance))
         } else {
             region.middle()
         };
+        // Into the gap between the obstacle and what is seen behind it: halfway, but no farther in than the body needs.
+        let gap = fmin((distances[border] - distance) / 2.0, passage.width);
+        let target = Point::polar(distance + gap, bearing(obstacle) + inwards * SECTOR / 2.0);
+        let edge = turn(goal_bearing, bearing(border));
         // A hair by its place, so that no two are equally far, and none as near as the goal itself.
-        let score = fabs(turn(goal_bearing, bearing(border))) + (index + 1) as f64 * 1e-9;
-        Some((score, Chosen { region, goal_in: false, free }, Point::polar(distance, free)))
+        let score = side.distance(edge) + (index + 1) as f64 * 1e-9;
+        let side = if edge < 0.0 { -1.0 } else { 1.0 };
+        Some((score, Chosen { region, goal_in: false, free, side }, target))
     }
 
     /// Whether a way to `target` passes between what is near: nothing lies around the target, and no two obstacles on both sides of
@@ -230,12 +272,15 @@ impl Regions {
     }
 }
 
-/// The rising edge of a region next to a direction (rad): the sector of the obstacle that makes it, that of the region's border, and 1 if
+/// The rising edge of a region next to a direction (rad), by the side that is kept to: the sector of the obstacle that makes it, that of the region's border, and 1 if
 /// the region lies to its left, −1 if to its right.
-pub(super) fn rising_edge(region: &Region, goal: f64) -> Option<(usize, usize, f64)> {
+pub(super) fn rising_edge(region: &Region, goal: f64, side: Side) -> Option<(usize, usize, f64)> {
     let right = region.rises_right.then(|| ((region.first + SECTORS - 1) % SECTORS, region.first, 1.0));
     let left = region.rises_left.then(|| ((region.last() + 1) % SECTORS, region.last(), -1.0));
-    let away = |edge: &(usize, usize, f64)| fabs(turn(goal, bearing(edge.1)));
+    // Both ends of a region of one sector are in it: then that counts whose obstacle is towards the goal.
+    let away = |edge: &(usize, usize, f64)| {
+        [edge.1, edge.0].map(|sector| side.distance(turn(goal, bearing(sector))))
+    };
     match (right, left) {
         (Some(right), Some(left)) => Some(if away(&left) < away(&right) { left } else { right }),
         (one, other) => one.or(other),

@@ -16,11 +16,13 @@ pub const SECTOR: f64 = TAU / SECTORS as f64;
 #[derive(Clone, Debug, PartialEq)]
 pub struct Sectors {
     nearest: [f64; SECTORS],
+    /// Whether a beam looked there.
+    viewed: [bool; SECTORS],
 }
 
 impl Default for Sectors {
     fn default() -> Sectors {
-        Sectors { nearest: [f64::INFINITY; SECTORS] }
+        Sectors { nearest: [f64::INFINITY; SECTORS], viewed: [false; SECTORS] }
     }
 }
 
@@ -45,6 +47,12 @@ impl Sectors {
     /// Forgets all.
     pub fn clear(&mut self) {
         self.nearest.fill(f64::INFINITY);
+        self.viewed.fill(false);
+    }
+
+    /// Whether a beam of a laser at the turning point looked into a sector, whatever it met.
+    pub fn is_viewed(&self, sector: usize) -> bool {
+        self.viewed[sector]
     }
 
     /// The distances (m).
@@ -56,6 +64,7 @@ impl Sectors {
     pub fn add(&mut self, other: &Sectors) {
         for (sector, range) in other.nearest.iter().enumerate() {
             self.put(sector, *range);
+            self.viewed[sector] |= other.viewed[sector];
         }
     }
 
@@ -94,9 +103,13 @@ impl Sectors {
         let (first, step) = (wrap(first) / SECTOR + (SECTORS / 2) as f64 + 0.5, step / SECTOR);
         for (i, range) in ranges.iter().enumerate() {
             let range = f64::from(*range);
-            if range > 0.0 && range < range_max {
+            if range > 0.0 {
                 let place = types::geometry::whole(first + step * i as f64);
-                self.put(place.rem_euclid(SECTORS as i32) as usize, range);
+                let place = place.rem_euclid(SECTORS as i32) as usize;
+                self.viewed[place] = true;
+                if range < range_max {
+                    self.put(place, range);
+                }
             }
         }
     }

@@ -20,7 +20,7 @@ use types::messages::{Avoidance, Situation, Twist};
 
 use super::body::Body;
 use super::nearness::nearest;
-use super::regions::{Chosen, Passage, Region, Regions, rising_edge, turn};
+use super::regions::{Chosen, Passage, Region, Regions, Side, rising_edge, turn};
 use super::sectors::{SECTORS, Sectors, bearing};
 
 /// How the robot avoids.
@@ -64,6 +64,7 @@ impl Parameters {
 pub struct SmoothNearness {
     parameters: Parameters,
     regions: Regions,
+    side: Side,
     edges: [f64; SECTORS],
 }
 
@@ -73,6 +74,7 @@ impl SmoothNearness {
         SmoothNearness {
             parameters,
             regions: Regions::new(),
+            side: Side::default(),
             edges: std::array::from_fn(|i| parameters.body.edge(bearing(i))),
         }
     }
@@ -112,7 +114,14 @@ impl SmoothNearness {
         let Some((chosen, free)) = free else {
             return Avoidance { situation: Situation::NoWay, ..seen };
         };
-        self.act(distances, &chosen, free, distance, seen)
+        let out = self.act(distances, &chosen, free, distance, seen);
+        self.side.keep(&chosen, out.left.min(out.right) >= 1.0);
+        out
+    }
+
+    /// Forgets on which side it goes round what is in the way: for another goal another one may be better.
+    pub fn forget(&mut self) {
+        self.side = Side::default();
     }
 
     /// Where to if nothing were a threat (rad), and the region in which that lies.
@@ -125,7 +134,7 @@ impl SmoothNearness {
         let goal_bearing = atan2(goal.y, goal.x);
         let radius = self.parameters.body.half_width();
         let straight = fmin(self.parameters.reach - radius, hypot(goal.x, goal.y) - radius);
-        let chosen = self.regions.choose(distances, goal, passage);
+        let chosen = self.regions.choose(distances, goal, passage, self.side);
         if self.regions.corridor_is_free(goal_bearing, radius, straight) {
             let chosen = chosen.unwrap_or(Chosen {
                 region: Region {
@@ -136,12 +145,13 @@ impl SmoothNearness {
                 },
                 goal_in: true,
                 free: goal_bearing,
+                side: 0.0,
             });
             return Some((chosen, goal_bearing));
         }
         let chosen = chosen?;
         let (right, left) = chosen.region.ends();
-        let Some((corner, _, inwards)) = rising_edge(&chosen.region, goal_bearing) else {
+        let Some((corner, _, inwards)) = rising_edge(&chosen.region, goal_bearing, self.side) else {
             return Some((chosen, chosen.free));
         };
         let off = asin(fmin((self.parameters.security + radius) / fmax(distances[corner], 1e-6), 1.0));
