@@ -117,16 +117,18 @@ impl Agent for EmergencyStopAction {
             );
         }
         self.guard.told = told.kind == StopKind::Soft;
-        if told.allowed.is_finite() {
-            // It may turn away on the spot.
-            self.bound.send(Twist::new(told.allowed, ANY));
+        let bounds = told.allowed.is_finite();
+        if bounds || self.guard.bounded {
+            // It may turn away on the spot. When it lets go it says so, or the last bound would hold for a while.
+            self.bound.send(Twist::new(told.allowed.min(ANY), ANY));
         }
+        self.guard.bounded = bounds;
         self.stop.send(told);
         Ok(())
     }
 }
 
-/// More than anything turns (rad/s).
+/// More than anything drives and turns (m/s, rad/s).
 const ANY: f64 = 1e3;
 /// The most points that are looked at.
 const POINTS: usize = 4096 + 64;
@@ -143,6 +145,7 @@ struct Guard {
     wish: Twist,
     touched: bool,
     told: bool,
+    bounded: bool,
     forward: Stopping,
     backward: Stopping,
     last: Option<Time>,
@@ -158,6 +161,7 @@ impl Default for Guard {
             wish: Twist::ZERO,
             touched: false,
             told: false,
+            bounded: false,
             forward: Stopping::new(Parameters::default()),
             backward: Stopping::new(Parameters::default()),
             last: None,
