@@ -15,6 +15,7 @@ mod machine;
 mod outcome;
 mod parcel;
 mod peers;
+mod plan;
 mod reflex;
 mod simulation;
 mod spin;
@@ -44,6 +45,8 @@ pub(crate) struct BenchArgs {
     /// A tenth of the rounds and samples: to see that it works, not to publish.
     #[arg(long)]
     quick: bool,
+    #[command(flatten)]
+    plan: plan::PlanArgs,
 }
 
 /// One measurement.
@@ -88,6 +91,12 @@ const BENCHES: &[Bench] = &[
         measure: grow::measure,
     },
     Bench {
+        name: "plan",
+        what: "ways over maps by all planners, beside A* of the crate pathfinding; and anew after a change",
+        goal: "plan/pathfinding 0.1, the first way of the field in a fifth of its time, 95 % of its ways the shortest when that has finished",
+        measure: plan::measure,
+    },
+    Bench {
         name: "watch",
         what: "what a log, top, a tap and changes take of a processor while a robot drives on the wall clock",
         goal: "less than 3 % of a processor, and nothing on threads in real time",
@@ -105,6 +114,8 @@ pub(super) struct Setting<'a> {
     program: Option<PathBuf>,
     /// Of so many rounds or samples one is done.
     shorter: usize,
+    /// What only the measurement of planners is told.
+    plan: plan::PlanArgs,
 }
 
 impl Setting<'_> {
@@ -136,7 +147,13 @@ pub(crate) fn bench(args: &BenchArgs, registry: &Registry, json: bool) -> Result
         peers: Peers::find(),
         program: std::env::current_exe().ok(),
         shorter: if args.quick { 10 } else { 1 },
+        plan: args.plan.clone(),
     };
+    if bench.name != "plan" && args.plan != plan::PlanArgs::default() {
+        let failure =
+            Failure::new(format!("--maps, --scen and --picture are not for the bench {}", bench.name));
+        return Err(failure.help("leave them out, or measure the planners: sinew bench plan"));
+    }
     let mut spins = spin::round_trips();
     let mut outcome = (bench.measure)(&setting)?;
     spins.extend(spin::round_trips());
@@ -175,7 +192,8 @@ mod tests {
     #[test]
     fn every_bench_gives_figures_and_names_the_ratios_that_want_another_system() {
         let registry = agents::registry();
-        let setting = Setting { registry: &registry, peers: None, program: None, shorter: 1000 };
+        let plan = plan::PlanArgs::default();
+        let setting = Setting { registry: &registry, peers: None, program: None, shorter: 1000, plan };
         for bench in BENCHES {
             let outcome = (bench.measure)(&setting).unwrap();
             let document = outcome.to_json(bench.name);

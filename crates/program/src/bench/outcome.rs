@@ -34,6 +34,10 @@ pub(super) struct Outcome {
     notes: Vec<String>,
     /// Ratios without their other system: it is not here.
     pub(super) missing: Vec<&'static str>,
+    /// For people, before the figures.
+    pub(super) table: Option<String>,
+    /// For programs, under a name of its own.
+    pub(super) document: Option<(&'static str, Json)>,
     /// Ratios whose other system is here, but could not be measured; with what it said.
     failed: Vec<(&'static str, Failure)>,
 }
@@ -154,18 +158,25 @@ impl Outcome {
             row
         });
         let granted = self.granted.iter().map(|(thread, policy)| json!({"thread": thread, "policy": policy}));
-        json!({
+        let mut document = json!({
             "bench": name,
             "machine": machine::describe(),
             "granted": granted.collect::<Vec<_>>(),
             "figures": self.figures.iter().map(Measured::to_json).collect::<Vec<_>>(),
             "ratios": ratios.collect::<Vec<_>>(),
             "notes": self.notes,
-        })
+        });
+        if let Some((name, more)) = &self.document {
+            document[*name] = more.clone();
+        }
+        document
     }
 
     pub(super) fn to_text(&self, name: &str) -> String {
         let mut out = format!("{name} on {}\n", machine::line());
+        if let Some(table) = &self.table {
+            out += &format!("{table}\n");
+        }
         let mut rows = vec![["figure", "unit", "n", "min", "p50", "p99", "p999", "max"].map(str::to_owned)];
         let number = |x: f64| if x.abs() >= 100.0 { format!("{x:.0}") } else { format!("{x:.2}") };
         for figure in &self.figures {
