@@ -17,6 +17,7 @@ mod nav;
 mod outcome;
 mod parcel;
 mod peers;
+mod plan;
 mod reflex;
 mod simulation;
 mod spin;
@@ -52,6 +53,8 @@ pub(crate) struct BenchArgs {
     /// Draws figures, where the measurement has any, into this folder.
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
+    #[command(flatten)]
+    plan: plan::PlanArgs,
 }
 
 /// One measurement.
@@ -102,6 +105,12 @@ const BENCHES: &[Bench] = &[
         measure: nav::measure,
     },
     Bench {
+        name: "plan",
+        what: "ways over maps by all planners, beside A* of the crate pathfinding; and anew after a change",
+        goal: "plan/pathfinding 0.1, the first way of the field in a fifth of its time, 95 % of its ways the shortest when that has finished",
+        measure: plan::measure,
+    },
+    Bench {
         name: "watch",
         what: "what a log, top, a tap and changes take of a processor while a robot drives on the wall clock",
         goal: "less than 3 % of a processor, and nothing on threads in real time",
@@ -138,6 +147,8 @@ pub(super) struct Setting<'a> {
     data: Option<PathBuf>,
     /// Where figures go; nowhere, and none are drawn.
     out: Option<PathBuf>,
+    /// What only the measurement of planners is told.
+    plan: plan::PlanArgs,
 }
 
 impl Setting<'_> {
@@ -171,7 +182,13 @@ pub(crate) fn bench(args: &BenchArgs, registry: &Registry, json: bool) -> Result
         shorter: if args.quick { 10 } else { 1 },
         data: args.data.clone(),
         out: args.out.clone(),
+        plan: args.plan.clone(),
     };
+    if bench.name != "plan" && args.plan != plan::PlanArgs::default() {
+        let failure =
+            Failure::new(format!("--maps, --scen and --picture are not for the bench {}", bench.name));
+        return Err(failure.help("leave them out, or measure the planners: sinew bench plan"));
+    }
     let mut spins = spin::round_trips();
     let mut outcome = (bench.measure)(&setting)?;
     spins.extend(spin::round_trips());
@@ -210,8 +227,16 @@ mod tests {
     #[test]
     fn every_bench_gives_figures_and_names_the_ratios_that_want_another_system() {
         let registry = agents::registry();
-        let setting =
-            Setting { registry: &registry, peers: None, program: None, shorter: 1000, data: None, out: None };
+        let plan = plan::PlanArgs::default();
+        let setting = Setting {
+            registry: &registry,
+            peers: None,
+            program: None,
+            shorter: 1000,
+            data: None,
+            out: None,
+            plan,
+        };
         for bench in BENCHES {
             let outcome = (bench.measure)(&setting).unwrap();
             let document = outcome.to_json(bench.name);

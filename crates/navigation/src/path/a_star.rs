@@ -6,7 +6,7 @@ use super::planner::{NoPath, Planner};
 use super::way::Path;
 
 /// A* with the octile distance (Hart, Nilsson and Raphael 1968). For when the way is wanted, on any machine, from a program that anybody can follow;
-/// [`Jump`](super::Jump) gives ways of the same length several times sooner. About 40 bytes a cell.
+/// [`Jump`](super::Jump) gives ways of the same length several times sooner. About 50 bytes a cell.
 #[derive(Clone, Debug)]
 pub struct AStar(BestFirst);
 

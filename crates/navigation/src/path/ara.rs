@@ -38,7 +38,7 @@ const ONE: Cost = 256;
 /// So many cells one refinement goes on from.
 const PIECE: usize = 256;
 
-/// Ways with a proven bound, from round to round. For comparison with the book; [`Field`](super::Field) has its ways sooner. About 60 bytes a cell.
+/// Ways with a proven bound, from round to round. For comparison with the book; [`Field`](super::Field) has its ways sooner. About 65 bytes a cell.
 #[derive(Clone, Debug)]
 pub struct Ara {
     size: Size,

@@ -49,6 +49,13 @@ impl Bits {
         &self.words[first..first + self.stride]
     }
 
+    /// A row between those above and below it.
+    #[inline]
+    pub(super) fn three(&self, y: u32) -> &[u64] {
+        let first = (y as usize - 1) * self.stride;
+        &self.words[first..first + 3 * self.stride]
+    }
+
     pub(super) fn row_mut(&mut self, y: u32) -> &mut [u64] {
         let first = y as usize * self.stride;
         &mut self.words[first..first + self.stride]

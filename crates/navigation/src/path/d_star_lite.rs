@@ -31,7 +31,7 @@ const UNKNOWN: Vertex = Vertex { cost: NEVER, ahead: NEVER, round: 0 };
 
 type Key = (Cost, Cost);
 
-/// The shortest way to a goal that stays, while obstacles come and go and the robot moves. For a single query [`Jump`](super::Jump) is much sooner. About 70 bytes
+/// The shortest way to a goal that stays, while obstacles come and go and the robot moves. For a single query [`Jump`](super::Jump) is much sooner. About 65 bytes
 /// a cell.
 #[derive(Clone, Debug)]
 pub struct DStarLite {

@@ -6,7 +6,7 @@ use super::grid::{Cell, Grid};
 use super::planner::{NoPath, Planner};
 use super::way::Path;
 
-/// Dijkstra's search (1959). For when the ways to many goals are wanted at once, and as the measure of all the others. About 40 bytes a cell.
+/// Dijkstra's search (1959). For when the ways to many goals are wanted at once, and as the measure of all the others. About 50 bytes a cell.
 #[derive(Clone, Debug)]
 pub struct Dijkstra(BestFirst);
 

@@ -23,13 +23,15 @@ impl Cell {
 /// The most columns and rows that a grid can have.
 pub const LARGEST: u32 = 4096;
 
-/// A floor of cells, some of which are taken. The memory for all of it is taken when it is made, two bits a cell.
+/// A floor of cells, some of which are taken. The memory for all of it is taken when it is made, three bits a cell.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Grid {
     width: u32,
     height: u32,
     taken: Bits,
     closed: Bits,
+    /// The same with columns for rows: a search along a column is one along a row.
+    columns: Bits,
     /// Rows while they grow wider.
     wide: Box<[u64]>,
 }
@@ -40,7 +42,8 @@ impl Grid {
         let (width, height) = (width.clamp(1, LARGEST), height.clamp(1, LARGEST));
         let bits = Bits::new(width + 2, height + 2);
         let wide = vec![0; bits.stride()].into_boxed_slice();
-        let mut grid = Grid { width, height, taken: bits.clone(), closed: bits, wide };
+        let columns = Bits::new(height + 2, width + 2);
+        let mut grid = Grid { width, height, taken: bits.clone(), closed: bits, columns, wide };
         grid.close_rim();
         grid
     }
@@ -126,11 +129,16 @@ impl Grid {
         &self.closed
     }
 
+    /// The same cells, where each column is a row.
+    pub(super) fn columns(&self) -> &Bits {
+        &self.columns
+    }
+
     fn is_inside(&self, cell: Cell) -> bool {
         cell.x < self.width && cell.y < self.height
     }
 
-    /// Closes what is around the floor, so that no search has to ask where it ends.
+    /// Closes what is around the floor, so that no search has to ask where it ends, and turns it.
     fn close_rim(&mut self) {
         for y in [0, self.height + 1] {
             self.closed.row_mut(y).fill(u64::MAX);
@@ -139,6 +147,7 @@ impl Grid {
             self.closed.set(0, y, true);
             bits::fill_from(self.closed.row_mut(y), self.width + 1);
         }
+        self.columns.transpose(&self.closed);
     }
 }
 

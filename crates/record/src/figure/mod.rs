@@ -12,6 +12,7 @@ mod key;
 mod map;
 mod periods;
 mod plane;
+mod potential;
 mod raster;
 mod sheet;
 mod svg;
@@ -24,6 +25,7 @@ pub use canvas::{Colour, Picture};
 pub use map::Map;
 pub use periods::{PeriodRow, Periods};
 pub use plane::{Drawing, Region};
+pub use potential::{Potential, PotentialPanel};
 pub use raster::RasterError;
 pub use sheet::{Panel, Sheet};
 pub use timing::{AgentTiming, Timing};
@@ -120,6 +122,16 @@ mod tests {
             .draw(),
             Map::default().draw(),
             Map { points: vec![Point { x: f64::NAN, y: 0.0 }], ..Map::default() }.draw(),
+            Potential::default().draw(),
+            Potential {
+                panels: vec![PotentialPanel {
+                    columns: 1,
+                    values: vec![f64::NAN, f64::INFINITY],
+                    ..Default::default()
+                }],
+                unit: "<&>".into(),
+            }
+            .draw(),
         ]
     }
 

@@ -41,14 +41,17 @@ pub(super) struct Queue {
     /// The search, counted down, above the bits of a potential.
     search: u64,
     entries: Box<[Entry]>,
-    /// How many entries were ever used, and the first of those that are free again.
+    /// How many entries were ever used, how many stand in buckets, and the first of those that are free again.
     used: u32,
+    standing: usize,
     free: u32,
     heads: Box<[u32]>,
     /// Where the first bucket begins, the lowest key in it, which can be lower still, and the first bucket that may not be empty.
     base: Cost,
     lowest: Cost,
     first: usize,
+    /// No bucket of this wave above this one was ever used.
+    last: usize,
 }
 
 impl Queue {
@@ -60,11 +63,13 @@ impl Queue {
             search: SEARCHES - 1,
             entries: vec![Entry { cell: 0, after: NONE }; 2 * cells].into_boxed_slice(),
             used: 0,
+            standing: 0,
             free: NONE,
             heads: vec![NONE; BUCKETS + 1].into_boxed_slice(),
             base: 0,
             lowest: 0,
             first: 0,
+            last: 0,
         }
     }
 
@@ -78,9 +83,10 @@ impl Queue {
                 self.search = SEARCHES - 2;
             }
         }
-        self.heads.fill(NONE);
-        (self.used, self.free) = (0, NONE);
-        (self.base, self.lowest, self.first) = (0, 0, 0);
+        self.heads[..=self.last].fill(NONE);
+        self.heads[NEXT_WAVE] = NONE;
+        (self.used, self.standing, self.free) = (0, 0, NONE);
+        (self.base, self.lowest, self.first, self.last) = (0, 0, 0, 0);
     }
 
     /// What a way from a cell costs; [`NEVER`] where none is known.
@@ -137,7 +143,7 @@ impl Queue {
     /// Whether there is a place for so many more entries. Where there is none, all must be [ordered](Self::order).
     #[inline]
     pub(super) fn has_room(&self, entries: usize) -> bool {
-        self.used as usize + entries <= self.entries.len()
+        self.standing + entries <= self.entries.len()
     }
 
     /// Lets a known cell wait with this key.
@@ -146,6 +152,7 @@ impl Queue {
         let bucket = ((key.saturating_sub(self.base) >> SHIFT) as usize).min(BEYOND);
         self.lowest = self.lowest.min(key);
         self.first = self.first.min(bucket);
+        self.last = self.last.max(bucket);
         self.enter(cell, bucket);
     }
 
@@ -168,6 +175,7 @@ impl Queue {
             self.free = entry.after;
         }
         *entry = Entry { cell, after: core::mem::replace(&mut self.heads[bucket], place) };
+        self.standing += 1;
         self.notes[cell as usize] |= WAITS;
     }
 
@@ -195,6 +203,7 @@ impl Queue {
             let entry = &mut self.entries[place as usize];
             self.heads[self.first] = core::mem::replace(&mut entry.after, self.free);
             self.free = place;
+            self.standing -= 1;
             let note = &mut self.notes[entry.cell as usize];
             if *note & WAITS != 0 {
                 *note &= !WAITS;
@@ -213,7 +222,7 @@ impl Queue {
     /// Orders anew all that wait by their keys, those for the next wave among them if it begins. Who has no key waits no more.
     pub(super) fn order(&mut self, is_next_wave: bool, key: impl Fn(u32, Cost) -> Option<Cost>) {
         let (mut chain, mut later, mut base) = (NONE, NONE, NEVER);
-        for bucket in 0..=NEXT_WAVE {
+        for bucket in (self.first..self.last + 1).chain([NEXT_WAVE]) {
             let mut place = core::mem::replace(&mut self.heads[bucket], NONE);
             while place != NONE {
                 let Entry { cell, after } = self.entries[place as usize];
@@ -233,7 +242,8 @@ impl Queue {
                 place = after;
             }
         }
-        (self.base, self.lowest, self.first) = (base, base, BUCKETS);
+        (self.base, self.lowest, self.first, self.standing) = (base, base, BUCKETS, 0);
+        self.last = 0;
         for (mut place, is_later) in [(later, true), (chain, false)] {
             while place != NONE {
                 let Entry { cell, after } = self.entries[place as usize];
@@ -251,8 +261,10 @@ impl Queue {
     /// All that wait, for this wave or the next; some of them more than once.
     pub(super) fn waiting(&self) -> impl Iterator<Item = (u32, Cost)> + '_ {
         let entry = |place: u32| (place != NONE).then(|| self.entries[place as usize]);
-        self.heads
+        let heads = self.heads.get(self.first..=self.last).unwrap_or_default();
+        heads
             .iter()
+            .chain([&self.heads[NEXT_WAVE]])
             .flat_map(move |head| core::iter::successors(entry(*head), move |at| entry(at.after)))
             .filter(|entry| self.notes[entry.cell as usize] & WAITS != 0)
             .map(|entry| (entry.cell, self.potential(entry.cell)))
@@ -316,6 +328,7 @@ mod tests {
                         now.retain(|_, potential| *potential < 400 * SIDE);
                     }
                 }
+                prop_assert!(queue.waiting().count() <= queue.standing);
                 let waiting: BTreeMap<u32, Cost> = queue.waiting().collect();
                 let all: BTreeMap<u32, Cost> = now.iter().chain(&later).map(|(c, p)| (*c, *p)).collect();
                 prop_assert_eq!(waiting, all);
