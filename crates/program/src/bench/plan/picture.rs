@@ -68,7 +68,7 @@ fn panel(grid: &Grid, field: &Field, title: &str) -> PotentialPanel {
     let best = field.best();
     PotentialPanel {
         title: format!(
-            "{title}: {:.1}, at least {:.0} % of it needed",
+            "{title}: {:.1} long, quality {:.0} % or better",
             best.length(),
             100.0 * best.quality()
         ),
