@@ -177,7 +177,7 @@ mod tests {
     fn a_late_pose_of_the_localizer_puts_odometry_right_where_it_was_then() {
         let mut place = Whereabouts::default();
         // Odometry began at (2, 1) of the map, looking up. At the time of the pose it had driven 1 m.
-        place.correct(Pose::new(2.0, 2.0, 1.5707963267948966), Pose::new(1.0, 0.0, 0.0), Time::ZERO);
+        place.correct(Pose::new(2.0, 2.0, types::geometry::PI / 2.0), Pose::new(1.0, 0.0, 0.0), Time::ZERO);
         let now = place.map_from_odometry.unwrap().then(Pose::new(1.5, 0.2, 0.0));
         assert!((now.x - 1.8).abs() < 1e-12 && (now.y - 2.5).abs() < 1e-12, "{now:?}");
     }

@@ -109,13 +109,12 @@ impl Agent for Tour {
                 self.from = Some(now + self.params.rest);
             }
         }
-        if !self.asked && self.task.is_none() && now >= from {
-            if let Some(goal) = self.params.goal(self.next) {
-                self.next += 1;
-                self.asked = self.go.call(goal, Duration::secs(2)).is_ok();
-                if self.next == self.params.count() {
-                    runtime::note!("the last place of the tour");
-                }
+        let is_free = !self.asked && self.task.is_none() && now >= from;
+        if let Some(goal) = self.params.goal(self.next).filter(|_| is_free) {
+            self.next += 1;
+            self.asked = self.go.call(goal, Duration::secs(2)).is_ok();
+            if self.next == self.params.count() {
+                runtime::note!("the last place of the tour");
             }
         }
         Ok(())

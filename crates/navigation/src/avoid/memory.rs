@@ -113,7 +113,7 @@ impl Memory {
         };
         // Around the circle once, from the last of them on.
         let things = || self.things.iter().flatten().filter_map(here);
-        let mut last = things().last();
+        let mut last = things().next_back();
         for (point, is_kept) in things() {
             if is_kept {
                 around.add_point(point);

@@ -13,6 +13,9 @@ const QUERIES: usize = 60;
 /// What is drawn for all maps.
 const SEED: u64 = 1;
 
+/// What draws a floor.
+type Draw = dyn Fn(&mut Grid, Stream);
+
 /// The maps with their queries; smaller and fewer where little is to be measured.
 pub(super) fn floors(shorter: usize) -> Vec<Floor> {
     let (side, queries) = if shorter > 100 { (48, 4) } else { (SIDE, (QUERIES / shorter).max(10)) };
@@ -21,9 +24,9 @@ pub(super) fn floors(shorter: usize) -> Vec<Floor> {
         strew(grid, chance, 0.012, 5);
         grid.inflate(2.5);
     };
-    let kinds: [(&str, &dyn Fn(&mut Grid, Stream)); 4] =
+    let kinds: [(&str, &Draw); 4] =
         [("strewn", &strewn), ("boxes", &boxes), ("rooms", &rooms), ("caves", &caves)];
-    let floor = |(name, draw): &(&str, &dyn Fn(&mut Grid, Stream))| {
+    let floor = |(name, draw): &(&str, &Draw)| {
         let mut grid = Grid::new(side, side);
         draw(&mut grid, Stream::new(SEED, name));
         let queries = queries_of_chance(&grid, name, queries);

@@ -37,12 +37,12 @@ pub(super) fn write(floors: &[Floor], file: &Path) -> Result<String, Failure> {
 /// The query of a map whose first way is the longest beside the shortest, and how much longer it is (sides of a cell).
 fn roughest(floor: &Floor) -> Option<(&Floor, Query, f64)> {
     let mut field = Field::new(floor.grid.width(), floor.grid.height());
-    let mut more = |query: &Query| {
+    let more = |query: &Query| {
         let optimum = query.length?;
         field.begin(&floor.grid, query.start, query.goal).ok()?;
         Some((floor, *query, field.best().length() - optimum))
     };
-    floor.queries.iter().filter_map(|query| more(query)).max_by(|a, b| a.2.total_cmp(&b.2))
+    floor.queries.iter().filter_map(more).max_by(|a, b| a.2.total_cmp(&b.2))
 }
 
 /// The potential with the first way and with the last, each as it was when the way was published.
