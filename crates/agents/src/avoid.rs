@@ -5,7 +5,7 @@
 use motion::ring::Ring;
 use navigation::avoid::nearness::{self, NearnessDiagram};
 use navigation::avoid::smooth::{self, SmoothNearness};
-use navigation::avoid::{Body, Sectors};
+use navigation::avoid::{Body, Memory, Sectors, memory};
 use runtime::{Agent, Fault, Input, Output, Step};
 use types::geometry::PI;
 use types::messages::{
@@ -16,6 +16,7 @@ use types::{Duration, Point, Pose, Text, Time};
 
 use crate::action::{Duty, NOTHING, Whereabouts, offer};
 use crate::shared::echoes;
+use crate::trust::Again;
 
 /// How it avoids.
 #[derive(Clone, Debug, Params)]
@@ -59,6 +60,9 @@ pub struct AvoidParams {
     /// Of a wired sensor that has told nothing for so long all may be an obstacle: it stands (time). 600 ms is two missed readings of a sonar at 4 Hz.
     #[param(default = Duration::millis(600), min = 0.02, max = 10.0)]
     pub stale: Duration,
+    /// How long it keeps in mind what its laser saw and cannot see now (time); 0 for not at all. 10 s are the way past a thing of its own size.
+    #[param(default = Duration::secs(10), min = 0.0, max = 600.0)]
+    pub remember: Duration,
     /// How much its wish matters to it, from 0 to 1.
     #[param(default = 1.0, min = 0.0, max = 1.0)]
     pub weight: f64,
@@ -74,6 +78,12 @@ impl AvoidParams {
             true => Body::Rectangle { front: self.length / 2.0, rear: self.length / 2.0, half_width },
             false => Body::Round { radius: half_width },
         }
+    }
+
+    fn memory(&self) -> memory::Parameters {
+        let body = self.body();
+        let passage = nearness::Parameters::new(body).passage;
+        memory::Parameters { keep: self.remember.seconds(), ..memory::Parameters::new(body.core(), passage) }
     }
 
     fn law(&self) -> Law {
@@ -137,12 +147,17 @@ impl Agent for Avoid {
             _ => return Err(Fault::new("\"law\" of an avoidance is \"nearness\" or \"smooth\"")),
         }
         self.sight.law.get_or_insert_with(|| self.params.law());
+        self.sight.memory.get_or_insert_with(|| Memory::new(self.params.memory()));
         Ok(())
     }
 
     fn step(&mut self, step: &mut Step) -> Result<(), Fault> {
         if let Some(goal) = self.goal.newest() {
-            self.sight.heard = Some(goal.points.last().map(|end| Point::from(*end)));
+            let goal = goal.points.last().map(|end| Point::from(*end));
+            if self.sight.heard != Some(goal) {
+                self.sight.forget();
+            }
+            self.sight.heard = Some(goal);
         }
         self.place.listen(&mut self.odometry, &mut self.pose, step.now);
         if let Some(odometry) = self.place.odometry {
@@ -152,13 +167,23 @@ impl Agent for Avoid {
         if is_action {
             self.duty.listen(&mut self.mode, &mut self.task);
             let task = self.duty.task(step.name_of(step.agent).unwrap_or_default().as_str());
+            if self.duty.is_new(task.as_ref(), step.now) {
+                self.sight.forget();
+            }
             let goal =
                 task.filter(|task| task.motion == Motion::Goto).and_then(|task| self.place.goal(&task));
             self.sight.heard = Some(goal);
             self.report.send(NOTHING);
         }
         if let Some(scan) = self.scan.newest() {
-            self.sight.laser.scan(&scan, scan.row(), scan.header().stamp);
+            let stamp = scan.header().stamp;
+            self.sight.laser.scan(&scan, scan.row(), stamp);
+            // Where it was when it looked: without odometry it has nothing to remember by.
+            let then = self.odometry.at(stamp).map(|found| found.value().pose);
+            self.sight.again.scan(&scan, scan.row(), stamp, then);
+            if let Some(then) = then.filter(|_| !self.sight.again.is_frozen()) {
+                self.sight.remember(then, &scan, scan.row(), stamp);
+            }
         }
         if let Some(ranges) = self.ranges.newest() {
             self.sight.sonar.ranges(&ranges, self.params.cone, ranges.header().stamp);
@@ -192,6 +217,14 @@ enum Law {
     Smooth(Box<SmoothNearness>),
 }
 
+/// Where a laser sits, its beams, and the range from which on they met nothing (m).
+fn beams<'a>(scan: &LaserScan, row: &'a [f32]) -> (Pose, Ring<'a>, f64) {
+    let sweep =
+        Ring::Sweep { angle_min: scan.angle_min.into(), angle_step: scan.angle_step.into(), ranges: row };
+    let mount = Pose::new(scan.mount_x.into(), scan.mount_y.into(), scan.mount_heading.into());
+    (mount, sweep, f64::from(scan.range_max) * 0.999)
+}
+
 /// What one sensor told last.
 #[derive(Debug, Default)]
 struct Seen {
@@ -201,11 +234,9 @@ struct Seen {
 
 impl Seen {
     fn scan(&mut self, scan: &LaserScan, row: &[f32], stamp: Time) {
-        let beams =
-            Ring::Sweep { angle_min: scan.angle_min.into(), angle_step: scan.angle_step.into(), ranges: row };
-        let mount = Pose::new(scan.mount_x.into(), scan.mount_y.into(), scan.mount_heading.into());
+        let (mount, beams, range_max) = beams(scan, row);
         self.sectors.clear();
-        self.sectors.add_scan(mount, beams, f64::from(scan.range_max) * 0.999);
+        self.sectors.add_scan(mount, beams, range_max);
         self.at = Some(stamp);
     }
 
@@ -229,21 +260,47 @@ struct Sight {
     laser: Seen,
     sonar: Seen,
     both: Sectors,
+    /// Whether the laser shows the same scan again and again.
+    again: Again,
+    /// What the laser saw a moment ago.
+    memory: Option<Memory>,
     pose: Pose,
     heard: Option<Option<Point>>,
 }
 
 impl Sight {
+    /// For another goal another way may be the better one.
+    fn forget(&mut self) {
+        match &mut self.law {
+            Some(Law::Nearness(law)) => law.forget(),
+            Some(Law::Smooth(law)) => law.forget(),
+            None => {}
+        }
+    }
+
+    /// Keeps in mind a scan that was made while the robot was at `then`.
+    fn remember(&mut self, then: Pose, scan: &LaserScan, row: &[f32], stamp: Time) {
+        if let Some(memory) = &mut self.memory {
+            let (mount, beams, range_max) = beams(scan, row);
+            memory.look(then.then(mount), beams, range_max, stamp.seconds());
+        }
+    }
+
     /// What the law makes of it; nothing without a goal. Each sensor that is wired must have told something lately.
     fn step(&mut self, params: &AvoidParams, wired: (bool, bool), now: Time) -> Option<Avoidance> {
         let own = || params.has_goal.then(|| Point::new(params.goal_x, params.goal_y));
         let goal = self.pose.inverse().transform(self.heard.unwrap_or_else(own)?);
         let of = [(wired.0, &self.laser), (wired.1, &self.sonar)];
-        let sees =
-            (wired.0 || wired.1) && of.iter().all(|(wired, seen)| !wired || seen.is_fresh(params.stale, now));
+        // A laser that shows the same from everywhere shows nothing.
+        let sees = (wired.0 || wired.1)
+            && !(wired.0 && self.again.is_frozen())
+            && of.iter().all(|(wired, seen)| !wired || seen.is_fresh(params.stale, now));
         self.both.clear();
         for (_, seen) in of.iter().filter(|(wired, _)| *wired) {
             self.both.add(&seen.sectors);
+        }
+        if let Some(memory) = &self.memory {
+            memory.recall(self.pose, &mut self.both);
         }
         let around = sees.then_some(&self.both);
         Some(match self.law.as_mut()? {
@@ -309,6 +366,61 @@ mod tests {
             "the laser is silent"
         );
         assert!(stands(sight.step(&params("nearness"), (false, true), at(0.7)).unwrap()), "too old");
+    }
+
+    #[test]
+    fn a_laser_that_falls_silent_or_shows_the_same_from_elsewhere_blinds_it_until_it_is_well_again() {
+        let params = params("nearness");
+        let mut sight = sight("nearness");
+        let head = LaserScan { range_max: 8.0, ..LaserScan::default() };
+        let mut look = |row: [f32; 4], seconds: f64, x: f64| {
+            sight.laser.scan(&head, &row, at(seconds));
+            sight.again.scan(&head, &row, at(seconds), Some(Pose::new(x, 0.0, 0.0)));
+            sight.step(&params, (true, false), at(seconds)).unwrap().situation == Situation::Blind
+        };
+        let scan = [3.0, 3.1, 3.2, 3.3];
+        assert!(!look(scan, 0.0, 0.0));
+        // While it stands a laser without noise may show the same.
+        assert!(!look(scan, 0.1, 0.01) && !look(scan, 0.2, 0.03));
+        assert!(look(scan, 0.3, 0.07) && look(scan, 0.4, 0.07), "the robot has come away");
+        assert!(!look([2.9, 3.0, 3.1, 3.2], 0.5, 0.07), "it is well again");
+        let silent = sight.step(&params, (true, false), at(1.2)).unwrap();
+        assert_eq!((silent.situation, silent.twist), (Situation::Blind, Twist::ZERO));
+    }
+
+    #[test]
+    fn what_a_half_turn_laser_has_turned_away_from_still_counts() {
+        let params = params("nearness");
+        let mut sight = sight("nearness");
+        sight.memory = Some(Memory::new(params.memory()));
+        let step = (PI / 180.0) as f32;
+        let head = LaserScan {
+            angle_min: (-PI / 2.0) as f32,
+            angle_step: step,
+            range_max: 8.0,
+            ..LaserScan::default()
+        };
+        // A wall half a metre ahead, and a robot that turns away from it to the right.
+        let row = |heading: f32| {
+            let range = |i: i16| 0.5 / (f32::from(i - 90) * step + heading).cos();
+            (0..=180)
+                .map(range)
+                .map(|range| if range > 0.0 { range.min(8.0) } else { 8.0 })
+                .collect::<Vec<_>>()
+        };
+        let mut look = |heading: f64, seconds: f64| {
+            let row = row(heading as f32);
+            sight.pose = Pose::new(0.0, 0.0, heading);
+            sight.laser.scan(&head, &row, at(seconds));
+            sight.remember(sight.pose, &head, &row, at(seconds));
+            sight.step(&params, (true, false), at(seconds)).unwrap()
+        };
+        look(0.0, 0.0);
+        look(-PI / 2.0, 1.0);
+        let behind = look(-3.0, 2.0);
+        assert!((behind.nearest - 0.275).abs() < 0.02, "{behind:?}");
+        assert!((behind.nearest_bearing.abs() - 3.0).abs() < 0.1, "{behind:?}");
+        assert!(look(-3.0, 13.0).nearest > 0.5, "after ten seconds it is forgotten");
     }
 
     #[test]

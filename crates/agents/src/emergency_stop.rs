@@ -16,6 +16,7 @@ use types::params::Params;
 use types::{Duration, Point, Pose, Time};
 
 use crate::shared::{Dated, echoes};
+use crate::trust::Again;
 
 /// The body, and how it brakes.
 #[derive(Clone, Debug, Params)]
@@ -92,7 +93,10 @@ impl Agent for EmergencyStopAction {
     fn step(&mut self, step: &mut Step) -> Result<(), Fault> {
         let now = step.now;
         if let Some(scan) = self.scan.newest() {
-            self.guard.look(&scan, scan.row(), scan.header().stamp);
+            let stamp = scan.header().stamp;
+            let then = self.odometry.at(stamp).map(|found| found.value().pose);
+            self.guard.again.scan(&scan, scan.row(), stamp, then);
+            self.guard.look(&scan, scan.row(), stamp);
         }
         if let Some(ranges) = self.ranges.newest() {
             self.guard.hear(&ranges, ranges.header().stamp);
@@ -140,6 +144,8 @@ struct Guard {
     /// What a scan showed, from the robot's middle, and when. Its memory is taken when the agent is made.
     seen: Vec<Point>,
     seen_at: Option<Time>,
+    /// Whether the laser shows the same scan again and again.
+    again: Again,
     heard: Option<Dated<Ranges>>,
     motion: Twist,
     wish: Twist,
@@ -156,6 +162,7 @@ impl Default for Guard {
         Guard {
             seen: Vec::with_capacity(POINTS),
             seen_at: None,
+            again: Again::default(),
             heard: None,
             motion: Twist::ZERO,
             wish: Twist::ZERO,
@@ -191,7 +198,9 @@ impl Guard {
     fn ahead(&self, params: &StopParams, twist: Twist, [scans, hears]: [bool; 2], now: Time) -> Option<f64> {
         let is_fresh = |stamp: Time| now - stamp <= params.stale;
         let radius = params.radius + params.side_margin;
-        if scans && !self.seen_at.is_some_and(is_fresh) || !(scans || hears) {
+        // A laser that shows the same from everywhere shows nothing.
+        let is_seeing = self.seen_at.is_some_and(is_fresh) && !self.again.is_frozen();
+        if scans && !is_seeing || !(scans || hears) {
             return None;
         }
         let way = |x: f64, y: f64| way_to(radius, twist, x, y);
@@ -303,6 +312,25 @@ mod tests {
         let both = looking(5.0, at(0)).judge(&params, [true, true], at(0));
         assert!(both.blind, "the sonars that are wired were not heard");
         assert!(Guard::default().judge(&params, [false, false], at(0)).blind);
+    }
+
+    #[test]
+    fn a_laser_that_shows_the_same_from_elsewhere_is_an_obstacle_until_it_shows_something_else() {
+        let params = StopParams::default();
+        let mut guard = Guard::default();
+        let mut kind = |distance: f32, millis: i64, x: f64| {
+            let (head, row) = scan(distance);
+            guard.again.scan(&head, &row, at(millis), Some(Pose::new(x, 0.0, 0.0)));
+            guard.look(&head, &row, at(millis));
+            let told = guard.judge(&params, LASER, at(millis));
+            (told.kind, told.blind)
+        };
+        assert_eq!(kind(5.0, 0, 0.0), (StopKind::None, false));
+        assert_eq!(kind(5.0, 100, 0.03), (StopKind::None, false));
+        assert_eq!(kind(5.0, 200, 0.07), (StopKind::Soft, true));
+        let well =
+            [300, 400, 500, 600, 700, 800].map(|millis| kind(4.9 + millis as f32 * 1e-4, millis, 0.07));
+        assert_eq!(well[5], (StopKind::None, false), "{well:?}");
     }
 
     #[test]

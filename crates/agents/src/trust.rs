@@ -7,7 +7,7 @@
 //! | a velocity, and always the same place | who moves comes away |
 //! | the same echoes to the last digit, elsewhere | a sensor that moves hears something else, if only its noise |
 
-use types::messages::{Echoes, Odometry, Ranges};
+use types::messages::{Echoes, LaserScan, Odometry, Ranges};
 use types::{Duration, Pose, Sequence, Time};
 
 use crate::shared::{Dated, echoes};
@@ -52,14 +52,41 @@ pub(crate) struct Trust {
     rings: [Again; 2],
 }
 
-/// A ring that may be heard again.
+/// A ring or a scan that may be the same again and again.
 #[derive(Clone, Copy, Debug, Default)]
-struct Again {
+pub(crate) struct Again {
     stamp: Option<Time>,
     values: u64,
     /// Where it was heard first.
     place: Option<Pose>,
     frozen: bool,
+}
+
+impl Again {
+    /// Takes over a scan, seen from where the robot was.
+    pub(crate) fn scan(&mut self, scan: &LaserScan, row: &[f32], stamp: Time, place: Option<Pose>) {
+        let met = row.iter().filter(|range| **range < scan.range_max).count();
+        self.hear(digest(row), met, stamp, place);
+    }
+
+    /// Whether it is the same as elsewhere.
+    pub(crate) fn is_frozen(&self) -> bool {
+        self.frozen
+    }
+
+    /// Takes over what was heard, a number that differs where it differs, with so many echoes.
+    fn hear(&mut self, values: u64, echoes: usize, stamp: Time, place: Option<Pose>) {
+        if self.stamp.replace(stamp) == Some(stamp) {
+            return;
+        }
+        if values != self.values || echoes < ECHOES {
+            *self = Again { stamp: Some(stamp), values, place, frozen: false };
+        } else if let (Some(here), Some(there)) = (place, self.place) {
+            let far = (here.position() - there.position()).norm() > ELSEWHERE.0;
+            let turned = types::geometry::wrap(here.heading - there.heading).abs() > ELSEWHERE.1;
+            self.frozen |= far || turned;
+        }
+    }
 }
 
 impl Trust {
@@ -87,18 +114,7 @@ impl Trust {
 
     /// Hears one of two rings, from where the robot is.
     pub(crate) fn ring(&mut self, which: usize, ranges: &Ranges, stamp: Time, place: Option<Pose>) {
-        let again = &mut self.rings[which];
-        if again.stamp.replace(stamp) == Some(stamp) {
-            return;
-        }
-        let values = digest(ranges);
-        if values != again.values || echoes(ranges).count() < ECHOES {
-            *again = Again { stamp: Some(stamp), values, place, frozen: false };
-        } else if let (Some(here), Some(there)) = (place, again.place) {
-            let far = (here.position() - there.position()).norm() > ELSEWHERE.0;
-            let turned = types::geometry::wrap(here.heading - there.heading).abs() > ELSEWHERE.1;
-            again.frozen |= far || turned;
-        }
+        self.rings[which].hear(digest(&ranges.values), echoes(ranges).count(), stamp, place);
     }
 
     /// What cannot be believed now.
@@ -129,9 +145,9 @@ fn is_finite(pose: Pose) -> bool {
 }
 
 /// A number that differs where values differ (FNV-1a).
-fn digest(ranges: &Ranges) -> u64 {
+fn digest(values: &[f32]) -> u64 {
     let step = |sum: u64, value: &f32| (sum ^ u64::from(value.to_bits())).wrapping_mul(0x0100_0000_01b3);
-    ranges.values.iter().fold(0xcbf2_9ce4_8422_2325, step)
+    values.iter().fold(0xcbf2_9ce4_8422_2325, step)
 }
 
 /// No transducer sits farther from the middle of its robot than this (m).

@@ -122,7 +122,9 @@ impl PotentialPanel {
             let value = self.values[i];
             match self.closed.get(i) {
                 Some(true) => Some(CLOSED),
-                _ if value.is_finite() => Some(colour((value / greatest * BANDS as f64) as usize)),
+                _ if value.is_finite() => {
+                    Some(colour(((value / greatest * BANDS as f64) as usize).min(BANDS - 1)))
+                }
                 _ => None,
             }
         };
