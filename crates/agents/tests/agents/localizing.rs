@@ -77,7 +77,15 @@ impl Agent for Body {
     }
 }
 
-type Heard = Arc<Mutex<(Vec<(Time, Pose)>, Vec<(Time, Localisation)>, Vec<bool>)>>;
+/// What was told: poses, how sure they are, and whether the word was taken.
+#[derive(Default)]
+struct Told {
+    poses: Vec<(Time, Pose)>,
+    states: Vec<(Time, Localisation)>,
+    answers: Vec<bool>,
+}
+
+type Heard = Arc<Mutex<Told>>;
 
 /// Writes down what is told, and at ten seconds says that the robot is elsewhere.
 #[derive(Agent)]
@@ -97,13 +105,13 @@ impl Agent for Witness {
         let mut heard = self.heard.lock().unwrap();
         while let Some(pose) = self.pose.take() {
             assert_eq!((pose.frame.as_str(), pose.body.as_str()), ("map", "base_link"));
-            heard.0.push((pose.header().stamp, pose.pose));
+            heard.poses.push((pose.header().stamp, pose.pose));
         }
         while let Some(state) = self.state.take() {
-            heard.1.push((state.header().stamp, *state));
+            heard.states.push((state.header().stamp, *state));
         }
         while let Some((_, reply)) = self.place.reply() {
-            heard.2.push(reply == Reply::Answer(Placed { taken: true }));
+            heard.answers.push(reply == Reply::Answer(Placed { taken: true }));
         }
         if step.now >= Time::from_seconds(10.0) && !self.said {
             self.said = true;
@@ -146,7 +154,7 @@ fn run(params: LocalizerParams, seconds: f64) -> (Report, Heard) {
 fn it_finds_the_robot_and_after_a_wrong_word_again_without_memory() {
     let (report, heard) = run(LocalizerParams { floor: floor(), ..LocalizerParams::default() }, 20.0);
     let heard = heard.lock().unwrap();
-    let (poses, states, answers) = &*heard;
+    let Told { poses, states, answers } = &*heard;
     let mut worst = 0.0f64;
     for (stamp, pose) in poses {
         worst = worst.max(pose.position().distance(truth(*stamp).position()));
@@ -191,8 +199,8 @@ fn a_start_that_is_known_is_begun_from() {
     };
     let (_, heard) = run(params, 2.0);
     let heard = heard.lock().unwrap();
-    assert!(heard.0[0].0.seconds() < 0.15, "with the first scan: {:?}", heard.0[0]);
-    assert!(heard.1.iter().all(|(_, told)| told.is_known()));
+    assert!(heard.poses[0].0.seconds() < 0.15, "with the first scan: {:?}", heard.poses[0]);
+    assert!(heard.states.iter().all(|(_, told)| told.is_known()));
 }
 
 #[test]

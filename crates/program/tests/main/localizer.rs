@@ -238,10 +238,6 @@ fn with_wheels_that_are_wrong_and_furniture_that_was_moved_it_is_right_to_a_cent
     let (places, heading) = diary.errors(0.0, 60.0);
     let (half, most, worst) = (quantile(&places, 0.5), quantile(&places, 0.95), quantile(&places, 1.0));
     assert!(places.len() > 280, "{} of 300 scans", places.len());
-    eprintln!(
-        "FIGURES {} scans, way {way}, half {half} 95 {most} worst {worst} heading {heading}",
-        places.len()
-    );
     assert!(half < 0.005 && most < 0.01 && worst < 0.02, "{half} {most} {worst}");
     assert!(heading < 0.02, "{heading}");
     assert!(diary.states(0.0, 60.0).all(|state| state == Whereabouts::Tracking));
@@ -253,19 +249,6 @@ fn from_an_unknown_start_and_after_it_was_carried_it_is_found() {
     let diary = run(5, "", Some((25.0, elsewhere)), "", 60);
     let diary = diary.lock().unwrap();
     assert_eq!(diary.states(0.0, 1.0).next(), Some(Whereabouts::Searching));
-    for (stamp, pose) in &diary.poses {
-        let t = diary.truth_at(*stamp);
-        if pose.position().distance(t.position()) > 0.01 {
-            eprintln!("WRONG {} {pose:?} {t:?}", stamp.seconds());
-        }
-    }
-    let mut last = None;
-    for (stamp, told) in &diary.states {
-        if last != Some(told.state) {
-            eprintln!("STATE {} {told:?}", stamp.seconds());
-            last = Some(told.state);
-        }
-    }
     let (places, _) = diary.errors(0.0, 60.0);
     assert!(quantile(&places, 1.0) < 0.02, "nothing wrong was told: {}", quantile(&places, 1.0));
     assert!(diary.states(15.0, 25.0).all(|state| state == Whereabouts::Tracking), "found");
