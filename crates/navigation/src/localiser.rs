@@ -9,7 +9,7 @@
 //!        one place alone fits     the same scan again and again
 //! ```
 //!
-//! While it tracks: an extended Kalman filter over (x, y, heading). The wheels predict ([`Drift`]), a scan that is laid over the floor
+//! While it tracks: an extended Kalman filter over (x, y, heading). The wheels predict ([`drift`](crate::drift)), a scan that is laid over the floor
 //! ([`crate::matching`]) corrects, in the form of information, so that what a scan does not tell is not touched:
 //!
 //! ```text
