@@ -59,7 +59,7 @@ pub struct ProcessSupervisor {
     tasks: Input<Task>,
     /// Who there is, and who lives.
     router: Router,
-    /// The mode, whenever it changes.
+    /// The mode, whenever it changes and before each task.
     mode: Output<Mode>,
     /// The task, after its mode.
     task: Output<Task>,
@@ -117,10 +117,12 @@ impl ProcessSupervisor {
 
     fn enter(&mut self, name: Name) {
         let Some(known) = self.params.modes.find(name.as_str()) else { return };
-        let before = self.now.map_or(Name::EMPTY, |mode| mode.name);
-        if self.now.is_some() && before == name {
-            return;
-        }
+        let before = match self.now {
+            None => Name::EMPTY,
+            Some(now) if now.name == name => now.before,
+            Some(now) => now.name,
+        };
+        // It is told also when it stays the same: who hears it may have been started anew.
         let mode = Mode { before, ..known.mode };
         self.now = Some(mode);
         self.mode.send(mode);

@@ -23,8 +23,12 @@ const DOTS: f64 = 200.0;
 /// The part of a run that the figure of periods shows (s): a second or two, or the marks run into each other.
 const WINDOW: f64 = 2.0;
 
-/// Draws all that a log has to show into `folder`, and gives the files.
-pub(crate) fn of_log(log: &Path, folder: &Path, timing: Option<Timing>) -> Result<Vec<PathBuf>, String> {
+/// Draws all that a log has to show into `folder`, and gives the files, and how its tasks ended.
+pub(crate) fn of_log(
+    log: &Path,
+    folder: &Path,
+    timing: Option<Timing>,
+) -> Result<(Vec<PathBuf>, Vec<TaskOutcome>), String> {
     let mut reader = Reader::open(log).map_err(|error| error.to_string())?;
     let run = reader.run().cloned().unwrap_or_default();
     let (mut trail, parts) = (Trail::new(&run), scenery::parts(&run.notes));
@@ -67,7 +71,7 @@ pub(crate) fn of_log(log: &Path, folder: &Path, timing: Option<Timing>) -> Resul
     if let Some(timing) = timing.filter(|timing| !timing.agents.is_empty()) {
         files.write("timing", &timing.draw())?;
     }
-    Ok(files.made)
+    Ok((files.made, trail.tasks))
 }
 
 /// How often agents sent something, what they missed, and when they were suspended.
@@ -100,16 +104,6 @@ pub(crate) struct TaskOutcome {
     pub(crate) last: Report,
     /// How far the robot truly was from the place then, where the truth is known and the place is one of the map (m).
     pub(crate) off: Option<f64>,
-}
-
-/// How the tasks of a log ended.
-pub(crate) fn tasks(log: &Path) -> Result<Vec<TaskOutcome>, String> {
-    let mut reader = Reader::open(log).map_err(|error| error.to_string())?;
-    let mut trail = Trail::new(&reader.run().cloned().unwrap_or_default());
-    while let Some(message) = reader.next_message().map_err(|error| error.to_string())? {
-        trail.take(&message);
-    }
-    Ok(trail.tasks)
 }
 
 /// What a log tells of how often agents ran.

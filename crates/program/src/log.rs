@@ -64,7 +64,7 @@ pub(crate) fn log(command: LogCommand, json: bool) -> Result<ExitCode, Failure> 
         }
         LogCommand::Plot { log, out } => {
             let folder = out.unwrap_or_else(|| log.parent().map(PathBuf::from).unwrap_or_default());
-            let files = figures::of_log(&log, &folder, None).map_err(wrong)?;
+            let (files, _) = figures::of_log(&log, &folder, None).map_err(wrong)?;
             if files.is_empty() {
                 return Err(
                     Failure::new(format!("{} holds nothing that could be drawn", log.display())).code(1)

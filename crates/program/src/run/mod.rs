@@ -364,10 +364,12 @@ impl One<'_> {
         if log.is_file() {
             summary.files.insert(0, log.clone());
         }
-        summary.tasks = figures::tasks(log).unwrap_or_default();
         let made = figures::of_log(log, &place.folder, Some(figures::timing(&summary.agents)));
         match made {
-            Ok(files) => summary.files.extend(files),
+            Ok((files, tasks)) => {
+                summary.files.extend(files);
+                summary.tasks = tasks;
+            }
             Err(error) => terminal::tell(&format!("warning: no figures: {error}")),
         }
     }

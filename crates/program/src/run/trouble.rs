@@ -144,6 +144,14 @@ fn an_action_that_dies_makes_the_robot_stand_and_a_new_goal_is_reached_when_it_i
 }
 
 #[test]
+fn a_real_time_supervisor_that_dies_makes_the_robot_stand_and_takes_the_next_goal() {
+    let again = "call navigation.go x=9.5 y=1.5 mode=goto";
+    let summary = asked("door", &[(1, FREE), (6, "fault supervisor panic"), (12, again)], 60);
+    ends(&summary, 2, Progress::Arrived);
+    nothing_touched(&summary);
+}
+
+#[test]
 fn a_goal_that_makes_no_sense_moves_nothing() {
     let summary =
         asked("senseless", &[(1, "call navigation.go x=1e9 y=0"), (2, "call navigation.drive")], 10);
