@@ -199,64 +199,64 @@ impl<'a> Search<'a> {
 
     /// Periods given back: those of the largest utilisation that fits, shared by elasticity.
     ///
-    /// Those who wait for different things need not give way as much as each other: where some could have half of what they gave back, and
-    /// others not, the others stay as they are, and what is left is shared among those again.
+    /// Those who wait for different things need not give way as much as each other: who could not have half of what it gave back stays as it is,
+    /// and what is left is shared among the others again. Where each of these could have it, but not all of them together, the most important have it first.
     fn shortened(&self, rooms: &[Room], settings: Vec<Setting>) -> Result<Vec<Setting>, Unsound> {
         let mut free = vec![true; rooms.len()];
         let mut settings = self.compressed(rooms, settings, &free)?;
         loop {
-            let mut held = false;
-            let lengthened = |at: &usize| free[*at] && settings[*at].period > rooms[*at].most().period;
-            for at in (0..rooms.len()).filter(lengthened).collect::<Vec<_>>() {
-                let (Some((from, _)), Some(period)) = (rooms[at].period, settings[at].period) else {
-                    continue;
-                };
-                let half = whole_between(from, period, near(from + (period - from) / Exact::from_integer(2)));
-                let mut back = settings.clone();
-                back[at].period = Some(half);
-                if !self.fits(&back)? {
-                    (free[at], held) = (false, true);
-                }
+            let is_left = |at: &usize| free[*at] && is_lengthened(&rooms[*at], &settings[*at]);
+            let left: Vec<usize> = by_importance(rooms).into_iter().rev().filter(is_left).collect();
+            for at in &left {
+                free[*at] = self.fits(&with_half_back(rooms, &settings, *at))?;
             }
-            let some_are_free =
-                (0..rooms.len()).any(|at| free[at] && settings[at].period > rooms[at].most().period);
-            // Where each could have more by itself, all of them together could not.
-            if !held || !some_are_free {
+            if !left.iter().any(|at| free[*at]) {
                 return Ok(settings);
             }
-            settings = self.compressed(rooms, settings, &free)?;
+            if !left.iter().all(|at| free[*at]) {
+                settings = self.compressed(rooms, settings, &free)?;
+                continue;
+            }
+            for at in left {
+                let back = with_half_back(rooms, &settings, at);
+                free[at] = self.fits(&back)?;
+                if free[at] {
+                    settings = back;
+                }
+            }
         }
     }
 
-    /// The same at once for those that are free; the others stay as they are.
+    /// The periods of those that are free, as short as fits, each in its measure; no longer than they are. The others stay as they are.
     fn compressed(
         &self,
         rooms: &[Room],
-        settings: Vec<Setting>,
+        mut settings: Vec<Setting>,
         free: &[bool],
     ) -> Result<Vec<Setting>, Unsound> {
+        for (setting, room) in settings.iter_mut().zip(rooms).filter(|(setting, _)| !setting.active) {
+            setting.period = room.most().period;
+        }
         let (places, springs) = self.springs(rooms, &settings, free);
         let with = |target: f64| {
             let mut settings = settings.clone();
-            for (at, room) in rooms.iter().enumerate() {
-                if !settings[at].active {
-                    settings[at].period = room.most().period;
-                }
-            }
             // A target below what is least is that, rounded.
             let periods = compress(&springs, target).unwrap_or_default();
             for (at, period) in places.iter().zip(periods) {
-                settings[*at].period = rooms[*at].period.map(|(from, to)| whole_between(from, to, period));
+                let period = rooms[*at].period.map(|(from, to)| whole_between(from, to, period));
+                settings[*at].period = period.min(settings[*at].period);
             }
             settings
         };
-        let used = |period: fn(&Spring) -> f64| springs.iter().map(|it| it.cost / period(it)).sum::<f64>();
-        let (least, nominal) = (used(|it| it.longest), used(|it| it.nominal));
+        let nominal = springs.iter().map(|it| it.cost / it.nominal).sum();
+        let present =
+            |(at, spring): (&usize, &Spring)| spring.cost / settings[*at].period.map_or(spring.longest, near);
+        let present = places.iter().zip(&springs).map(present).sum();
         let all = with(nominal);
         if self.fits(&all)? {
             return Ok(all);
         }
-        self.largest(least, nominal, with(0.0), with)
+        self.largest(present, nominal, settings.clone(), with)
     }
 
     /// Those whose periods give way, with their places.
@@ -293,6 +293,23 @@ impl<'a> Search<'a> {
         }
         Ok(best)
     }
+}
+
+/// Whether it gives of its period so much that it is worth to give of it back.
+fn is_lengthened(room: &Room, setting: &Setting) -> bool {
+    let (Some((from, _)), Some(period)) = (room.period, setting.period) else { return false };
+    period > from * Exact::new(1001, 1000)
+}
+
+/// The same, when this one has half of what it lengthened its period by.
+fn with_half_back(rooms: &[Room], settings: &[Setting], at: usize) -> Vec<Setting> {
+    let mut back = settings.to_vec();
+    if let (Some((from, _)), Some(period)) = (rooms[at].period, settings[at].period) {
+        let half = near(from + (period - from) / Exact::from_integer(2));
+        // Rounded down, so that it is less in any case.
+        back[at].period = Some(rounded_down(half).clamp(from, period));
+    }
+    back
 }
 
 /// A period as it is set: no rounding leads out of the limits.
