@@ -6,11 +6,15 @@
 //!  bumper ──▶ told as a hard stop                                   (the latch itself is set by the driver)
 //! ```
 //!
+//! Where people walk about it is told how fast, and slows in time so that whoever runs into the robot finds it standing: [`motion::passive`].
+//!
 //! It only slows and stops: its bound goes past the coordinator, to the drive, whoever drives in whatever mode. The law is
 //! [`motion::stopping`].
 
+use motion::passive;
 use motion::stopping::{Parameters, Stopping, Verdict, way_to};
 use runtime::{Agent, Fault, Input, Output, Step};
+use types::geometry::TAU;
 use types::messages::{Bumper, EmergencyStop, LaserScan, Odometry, Ranges, StopKind, Twist};
 use types::params::Params;
 use types::{Duration, Point, Pose, Time};
@@ -45,6 +49,12 @@ pub struct StopParams {
     /// From standing it lets go when there is as much way as this speed needs (m/s).
     #[param(default = 0.1, min = 0.0, max = 5.0)]
     pub least: f64,
+    /// How fast people may come (m/s): it drives into nobody, whoever walks where. 0 where nobody walks; 1.5 is a brisk walk.
+    #[param(default = 0.0, min = 0.0, max = 10.0)]
+    pub people: f64,
+    /// What is then left between the two (m). 5 cm are the noise of a laser and what a loose coat is wider than a body.
+    #[param(default = 0.05, min = 0.0, max = 5.0)]
+    pub people_margin: f64,
     /// Readings older than this are none, and who does not see stops (time). 350 ms are two missed scans at 10 Hz.
     #[param(default = Duration::millis(350), min = 0.01, max = 60.0)]
     pub stale: Duration,
@@ -61,6 +71,17 @@ impl StopParams {
             calm: self.calm,
             least: self.least,
         }
+    }
+
+    /// Where people walk about.
+    fn passive(&self) -> Option<passive::Parameters> {
+        (self.people > 0.0).then_some(passive::Parameters {
+            radius: self.radius,
+            reaction: self.reaction,
+            deceleration: self.deceleration,
+            margin: self.people_margin,
+            people: self.people,
+        })
     }
 }
 
@@ -138,12 +159,16 @@ const ANY: f64 = 1e3;
 const POINTS: usize = 4096 + 64;
 /// Slower than this it stands, and the wish says where to (m/s).
 const STANDING: f64 = 0.02;
+/// So little of a whole turn may lie between the last beam and the first (rad): a beam of a coarse laser.
+const SLIT: f64 = 0.1;
 
 #[derive(Debug)]
 struct Guard {
     /// What a scan showed, from the robot's middle, and when. Its memory is taken when the agent is made.
     seen: Vec<Point>,
     seen_at: Option<Time>,
+    /// Whether the scan went all around.
+    sees_behind: bool,
     /// Whether the laser shows the same scan again and again.
     again: Again,
     heard: Option<Dated<Ranges>>,
@@ -162,6 +187,7 @@ impl Default for Guard {
         Guard {
             seen: Vec::with_capacity(POINTS),
             seen_at: None,
+            sees_behind: false,
             again: Again::default(),
             heard: None,
             motion: Twist::ZERO,
@@ -181,6 +207,8 @@ impl Guard {
         let mount = Pose::new(scan.mount_x.into(), scan.mount_y.into(), scan.mount_heading.into());
         self.seen.clear();
         self.seen_at = Some(stamp);
+        let field = row.len() as f64 * f64::from(scan.angle_step).abs();
+        self.sees_behind = field > TAU - SLIT;
         for (i, range) in row.iter().enumerate().take(POINTS) {
             // A range that is no number is a beam that did not come back; the longest is a way that is free.
             if *range > scan.range_min && *range < scan.range_max {
@@ -216,6 +244,22 @@ impl Guard {
         Some(ahead)
     }
 
+    /// The highest speed at which it stands before anybody who is seen, or may come where nobody looks, is there.
+    fn among_people(&self, params: &StopParams, twist: Twist, [scans, hears]: [bool; 2]) -> f64 {
+        let Some(law) = params.passive() else { return f64::INFINITY };
+        if twist.linear < 0.0 && !hears && !self.sees_behind {
+            return 0.0;
+        }
+        let speed = |least: f64, point: Point| least.min(passive::speed(&law, twist, point.x, point.y));
+        let seen = if scans { &self.seen[..] } else { &[] };
+        let least = seen.iter().fold(f64::INFINITY, |least, point| speed(least, *point));
+        let heard = self.heard.as_ref().filter(|_| hears);
+        heard
+            .iter()
+            .flat_map(|heard| echoes(&heard.value))
+            .fold(least, |least, (bearing, range)| speed(least, Point::polar(range, bearing)))
+    }
+
     fn judge(&mut self, params: &StopParams, sees: [bool; 2], now: Time) -> EmergencyStop {
         let dt = self.last.replace(now).map_or(0.0, |last| (now - last).seconds());
         let stands = self.motion.linear.abs() < STANDING;
@@ -235,6 +279,9 @@ impl Guard {
         let behind = step(is_back, -1.0, &mut backward);
         (self.forward, self.backward) = (forward, backward);
         let (Verdict { stopping, allowed, ahead, critical }, blind) = if is_back { behind } else { ahead };
+        let people =
+            self.among_people(params, Twist::new(if is_back { -STANDING } else { STANDING }, turn), sees);
+        let (stopping, allowed) = (stopping || people < self.motion.linear.abs(), allowed.min(people));
         let kind = match (self.touched, stopping) {
             (true, _) => StopKind::Hard,
             (false, true) => StopKind::Soft,
@@ -331,6 +378,39 @@ mod tests {
         let well =
             [300, 400, 500, 600, 700, 800].map(|millis| kind(4.9 + millis as f32 * 1e-4, millis, 0.07));
         assert_eq!(well[5], (StopKind::None, false), "{well:?}");
+    }
+
+    #[test]
+    fn where_people_walk_it_slows_for_what_is_beside_it_and_drives_back_only_where_it_looks() {
+        let params = StopParams { people: 1.5, ..StopParams::default() };
+        // One beam to the left, 1.14 m from the middle: 0.8 = 1.5 (0.2 + 0.3) + 0.05 from the rim.
+        let beam = |field: f32| {
+            let mut guard = Guard::default();
+            let head = LaserScan {
+                angle_min: -field / 2.0,
+                angle_step: field / 360.0,
+                range_max: 8.0,
+                ..LaserScan::default()
+            };
+            let row: Vec<f32> = (0..360)
+                .map(|i| if i == 180 + (90.0 * 360.0 / field.to_degrees()) as i32 { 1.14 } else { 8.0 })
+                .collect();
+            guard.look(&head, &row, at(0));
+            guard
+        };
+        let all_around = TAU as f32;
+        let mut guard = beam(all_around);
+        guard.motion = Twist::new(0.29, 0.0);
+        let told = guard.judge(&params, LASER, at(0));
+        assert!(told.kind == StopKind::None && (told.allowed - 0.3).abs() < 2e-3, "{told:?}");
+        guard.motion = Twist::new(0.31, 0.0);
+        assert_eq!(guard.judge(&params, LASER, at(20)).kind, StopKind::Soft);
+        let back = |mut guard: Guard| {
+            guard.motion = Twist::new(-0.1, 0.0);
+            guard.judge(&params, LASER, at(40)).allowed
+        };
+        assert!(back(beam(all_around)) > 0.2);
+        assert_eq!(back(beam(270f32.to_radians())), 0.0, "somebody may be behind it");
     }
 
     #[test]

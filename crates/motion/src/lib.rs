@@ -24,6 +24,7 @@
 //! | [`ring`] | ranges around the robot, of a few sonars or of a laser |
 //! | [`safety`] | how fast is still safe, and where there is room |
 //! | [`stopping`] | when to stop softly, how, and until when |
+//! | [`passive`] | how fast, so that whoever walks into it finds it standing |
 //! | [`stop`] | how speed falls in a hard stop and in a soft one |
 //! | [`wall`] | steering along a wall |
 //! | [`boundary`] | which ways a body fits through, and which of them is along the wall |
@@ -46,6 +47,7 @@ pub mod limits;
 pub mod manoeuvre;
 pub mod motor;
 pub mod odometry;
+pub mod passive;
 pub mod profile;
 pub mod pursuit;
 pub mod ring;

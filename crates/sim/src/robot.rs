@@ -371,8 +371,12 @@ impl Robot {
         };
         let Pose { heading, .. } = self.truth.pose;
         let lever = near.point - self.truth.pose.position();
-        // How the point of the robot that is touched moves in this step.
-        let Motion { distance, turn, .. } = self.motion;
+        // How the point of the robot that is touched moves by what the wheels roll in this step: slip by chance leads nowhere.
+        let drive = &self.model.drive;
+        let [left, right] = self.motion.wheels;
+        let (left, right) =
+            (left * drive.wheel_radius * drive.left_scale, right * drive.wheel_radius * drive.right_scale);
+        let (distance, turn) = ((left + right) / 2.0, (right - left) / (drive.axle * drive.axle_scale));
         let moves = Point::polar(distance, heading) + Point::new(-lever.y, lever.x) * turn;
         let (low, high) = body.solid.bounds();
         let towards = (low + high) * 0.5 - near.point;

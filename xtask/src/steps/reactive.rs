@@ -1,4 +1,5 @@
-//! The reactive layer: what is asked of it in the scenario `reactive`, and hundreds of goals by the pose of the localizer alone.
+//! The reactive layer: what is asked of it in the scenario `reactive`, hundreds of goals by the pose of the localizer alone, and a robot among
+//! people.
 
 use serde_json::Value;
 
@@ -33,6 +34,8 @@ const OFF: f64 = 0.02;
 /// The same at the end of a path, which is as long as the robot counts it (m).
 const OFF_PATH: f64 = 0.04;
 const GOALS: usize = 300;
+/// How many places it comes to among people, at least: ten minutes, and most are reached within one.
+const AMONG_PEOPLE: usize = 4;
 
 /// Runs both; says what was seen.
 pub(super) fn run(workspace: &Workspace, program: &std::path::Path) -> Result<String, Failure> {
@@ -51,7 +54,13 @@ pub(super) fn run(workspace: &Workspace, program: &std::path::Path) -> Result<St
     let most = all_reached(&goals).map_err(|what| Failure::new(format!("goals: {what}"), REMEDY))?;
     // Its log is of hundreds of megabytes.
     let _ = std::fs::remove_dir_all(&out);
-    Ok(format!("reactive, {GOALS} goals at most {:.0} mm off", most * 1e3))
+    let words = ["run", "crowd", "--for", "10min", "--no-log", "--json"];
+    let crowd = sinew::document(Tool::new(program, &workspace.root).args(words), REMEDY)?;
+    let places = among_people(&crowd).map_err(|what| Failure::new(format!("crowd: {what}"), REMEDY))?;
+    Ok(format!(
+        "reactive, {GOALS} goals at most {:.0} mm off, {places} places among people without a collision",
+        most * 1e3
+    ))
 }
 
 /// What people ask of a robot that runs, on the command line.
@@ -79,7 +88,7 @@ fn calls(workspace: &Workspace, program: &std::path::Path) -> Result<(), Failure
     }
 }
 
-const REMEDY: &str = "Look at it: cargo run --release -- run reactive, and run goals; their figures lie in the folders that the summaries name.";
+const REMEDY: &str = "Look at it: cargo run --release -- run reactive, run goals, and run crowd; their figures lie in the folders that the summaries name.";
 
 fn tasks(run: &Value) -> Result<&Vec<Value>, String> {
     run["tasks"].as_array().ok_or_else(|| "the document has no \"tasks\"".to_owned())
@@ -126,6 +135,16 @@ fn all_reached(run: &Value) -> Result<f64, String> {
     }
 }
 
+/// To how many places it came without driving into anybody.
+fn among_people(run: &Value) -> Result<usize, String> {
+    let places = tasks(run)?.iter().filter(|task| task["ended"] == "arrived").count();
+    match run["collisions"].as_u64() {
+        Some(0) if places >= AMONG_PEOPLE => Ok(places),
+        Some(0) => Err(format!("it came to {places} places, and {AMONG_PEOPLE} are asked for")),
+        _ => Err(format!("collisions: {}", run["collisions"])),
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -156,5 +175,14 @@ mod tests {
         assert!(all_reached(&run(&tasks[1..])).unwrap_err().contains("299 of 300"));
         tasks[7] = task(8, "arrived", 0.021);
         assert!(all_reached(&run(&tasks)).unwrap_err().contains("0.021"));
+    }
+
+    #[test]
+    fn among_people_it_gets_on_and_drives_into_nobody() {
+        let tasks: Vec<Value> = (1..=5).map(|i| task(i, "arrived", 0.3)).collect();
+        let run = |tasks: &[Value], collisions: u64| json!({"tasks": tasks, "collisions": collisions});
+        assert_eq!(among_people(&run(&tasks, 0)), Ok(5));
+        assert!(among_people(&run(&tasks, 1)).unwrap_err().contains("collisions: 1"));
+        assert!(among_people(&run(&tasks[2..], 0)).unwrap_err().contains("to 3 places"));
     }
 }
