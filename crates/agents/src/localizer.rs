@@ -15,7 +15,7 @@ use std::any::Any;
 use navigation::drift::Drift;
 pub use navigation::floor::FloorPlan;
 use navigation::floor::PlanField;
-use navigation::localiser::{Localiser, LocaliserParams, State};
+use navigation::localisation::floor::{FloorLocalizer, FloorParams, State};
 use navigation::matching::{Geometry, MatchParams};
 use navigation::monte_carlo::MonteCarloParams;
 use runtime::{Agent, Envelope, Fault, Input, Output, Service, Step};
@@ -110,8 +110,8 @@ fn whole(params: &LocalizerParams, read: &Table) -> Vec<Mistake> {
 }
 
 impl LocalizerParams {
-    fn localiser(&self) -> LocaliserParams {
-        LocaliserParams {
+    fn floor_params(&self) -> FloorParams {
+        FloorParams {
             radius: self.radius,
             drift: Drift { wheel: self.wheel_noise, track: self.track, ..Drift::default() },
             matching: MatchParams {
@@ -127,7 +127,7 @@ impl LocalizerParams {
             inliers_least: self.inliers_least,
             inliers_sure: self.inliers_sure,
             misses: self.misses,
-            ..LocaliserParams::default()
+            ..FloorParams::default()
         }
     }
 }
@@ -165,7 +165,7 @@ impl Agent for Localizer {
             && before
                 .tracker
                 .as_ref()
-                .is_some_and(|tracker| *tracker.localiser.floor().plan() == self.params.floor)
+                .is_some_and(|tracker| *tracker.localizer.floor().plan() == self.params.floor)
         {
             core::mem::swap(&mut self.tracker, &mut before.tracker);
         }
@@ -174,7 +174,7 @@ impl Agent for Localizer {
     fn step(&mut self, step: &mut Step) -> Result<(), Fault> {
         let Localizer { scan, odometry, place, pose, state, params, tracker } = self;
         let Some(tracker) = tracker else { return Ok(()) };
-        tracker.localiser.set_params(params.localiser());
+        tracker.localizer.set_params(params.floor_params());
         place.serve(|placement| tracker.place(params, placement));
         if let Some(received) = scan.newest() {
             let stamp = received.header().stamp;
@@ -188,7 +188,7 @@ impl Agent for Localizer {
         } else if let Some(moved) = odometry.latest()
             && tracker.is_silent(step.now, params.silence)
         {
-            tracker.localiser.silence(moved.pose);
+            tracker.localizer.silence(moved.pose);
             state.send(tracker.told());
         }
         Ok(())
@@ -197,7 +197,7 @@ impl Agent for Localizer {
 
 /// What keeps track of the robot.
 struct Tracker {
-    localiser: Localiser<PlanField>,
+    localizer: FloorLocalizer<PlanField>,
     /// When the last scan was heard that was measured, or the agent began.
     heard: Option<Time>,
 }
@@ -206,18 +206,18 @@ impl Tracker {
     fn new(params: &LocalizerParams) -> Result<Tracker, Fault> {
         let floor = PlanField::new(&params.floor).map_err(Fault::of)?;
         let stream = Stream::new(params.seed, "localizer");
-        let mut localiser = Localiser::new(floor, params.localiser(), stream);
+        let mut localizer = FloorLocalizer::new(floor, params.floor_params(), stream);
         if params.known_start {
             let start = Pose::new(params.x, params.y, params.heading);
-            localiser.place(start, params.start_deviation, params.start_heading_deviation);
+            localizer.place(start, params.start_deviation, params.start_heading_deviation);
         }
-        Ok(Tracker { localiser, heard: None })
+        Ok(Tracker { localizer, heard: None })
     }
 
     fn place(&mut self, params: &LocalizerParams, placement: &Placement) -> Placed {
         let Placement { x, y, heading, deviation, heading_deviation, anywhere } = *placement;
         if anywhere {
-            self.localiser.forget();
+            self.localizer.forget();
             return Placed { taken: true };
         }
         let taken = [x, y, heading, deviation, heading_deviation].iter().all(|number| number.is_finite());
@@ -225,7 +225,7 @@ impl Tracker {
             let usual = |told: f64, usual: f64| if told > 0.0 { told } else { usual };
             let place = usual(deviation, params.start_deviation);
             let turn = usual(heading_deviation, params.start_heading_deviation);
-            self.localiser.place(Pose::new(x, y, heading), place, turn);
+            self.localizer.place(Pose::new(x, y, heading), place, turn);
         }
         Placed { taken }
     }
@@ -240,8 +240,8 @@ impl Tracker {
             range_max: scan.range_max.into(),
             mount: Pose::new(scan.mount_x.into(), scan.mount_y.into(), scan.mount_heading.into()),
         };
-        self.localiser.update(moved.pose, row, &geometry);
-        let pose = self.localiser.fix()?;
+        self.localizer.update(moved.pose, row, &geometry);
+        let pose = self.localizer.fix()?;
         Some(Odometry { frame: MAP.into(), body: BODY.into(), pose, twist: moved.twist })
     }
 
@@ -256,19 +256,19 @@ impl Tracker {
     }
 
     fn told(&self) -> Localisation {
-        let (deviation, heading_deviation) = self.localiser.deviations();
+        let (deviation, heading_deviation) = self.localizer.deviations();
         let mut told = Localisation {
-            state: match self.localiser.state() {
+            state: match self.localizer.state() {
                 State::Lost => Whereabouts::Lost,
                 State::Searching => Whereabouts::Searching,
                 State::Tracking => Whereabouts::Tracking,
             },
             deviation,
             heading_deviation,
-            inliers: self.localiser.inliers(),
+            inliers: self.localizer.inliers(),
             ..Localisation::default()
         };
-        for place in self.localiser.places() {
+        for place in self.localizer.places() {
             let Pose { x, y, heading } = place.pose;
             // There is room for as many as there can be.
             let _ = told.guesses.push(Guess { x, y, heading, inliers: place.inliers });

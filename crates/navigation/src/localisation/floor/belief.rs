@@ -4,7 +4,7 @@ use libm::{sincos, sqrt};
 use types::Pose;
 use types::geometry::wrap;
 
-use super::LocaliserParams;
+use super::FloorParams;
 use crate::drift::Drift;
 use crate::linear::{Matrix, Vector, ZERO, diagonal, dot, inverse, product, sum, through, times};
 
@@ -85,7 +85,7 @@ impl Belief {
     }
 
     /// So far off (m) may be what is looked for.
-    pub(super) fn reach(&self, params: &LocaliserParams) -> f64 {
+    pub(super) fn reach(&self, params: &FloorParams) -> f64 {
         const LEVER: f64 = 3.0;
         let (place, heading) = self.deviations();
         (0.1 + 3.0 * (place + LEVER * heading)).min(params.matching.reach)

@@ -18,17 +18,17 @@
 //! ```
 //!
 //! While it searches: a cloud ([`crate::monte_carlo`]) and draws from anywhere propose places; each is laid over the floor and followed
-//! from scan to scan. It is decided when one fits and no other fits as well ([`Localiser::places`] tells them); on a floor that looks the same from
+//! from scan to scan. It is decided when one fits and no other fits as well ([`FloorLocalizer::places`] tells them); on a floor that looks the same from
 //! two places that is never.
 //!
-//! A pose is given only right after a scan that fits. In between, dead reckoning goes on from there: [`Localiser::pose_at`].
+//! A pose is given only right after a scan that fits. In between, dead reckoning goes on from there: [`FloorLocalizer::pose_at`].
 
 mod belief;
 mod candidates;
 mod params;
 
 pub use candidates::{MOST_PLACES, Place};
-pub use params::LocaliserParams;
+pub use params::FloorParams;
 
 use types::Pose;
 use types::chance::Stream;
@@ -71,9 +71,9 @@ pub enum Outcome {
 
 /// Where the robot is. All memory is taken when it is made: that of the floor, and 2 MB for 8000 particles.
 #[derive(Clone, Debug)]
-pub struct Localiser<F> {
+pub struct FloorLocalizer<F> {
     floor: F,
-    params: LocaliserParams,
+    params: FloorParams,
     state: State,
     belief: Belief,
     /// Where the wheels said that the robot is when the belief was true.
@@ -94,11 +94,11 @@ pub struct Localiser<F> {
     searched: u32,
 }
 
-impl<F: Distances> Localiser<F> {
+impl<F: Distances> FloorLocalizer<F> {
     /// Of a robot that may be anywhere.
-    pub fn new(floor: F, params: LocaliserParams, stream: Stream) -> Localiser<F> {
+    pub fn new(floor: F, params: FloorParams, stream: Stream) -> FloorLocalizer<F> {
         let cloud = MonteCarlo::new(&floor, params.radius, params.cloud, stream);
-        Localiser {
+        FloorLocalizer {
             floor,
             params,
             state: State::Searching,
@@ -132,8 +132,8 @@ impl<F: Distances> Localiser<F> {
     }
 
     /// Other parameters from now on. Those of the cloud stay.
-    pub fn set_params(&mut self, params: LocaliserParams) {
-        self.params = LocaliserParams { cloud: self.params.cloud, radius: self.params.radius, ..params };
+    pub fn set_params(&mut self, params: FloorParams) {
+        self.params = FloorParams { cloud: self.params.cloud, radius: self.params.radius, ..params };
     }
 
     /// Takes a scan, and where the wheels said that the robot was when it was taken (in any frame that does not jump).
@@ -287,7 +287,7 @@ impl<F: Distances> Localiser<F> {
         }
         self.misses = 0;
         self.searched += 1;
-        let Localiser { floor, scan, cloud, candidates, hypotheses, params, .. } = self;
+        let FloorLocalizer { floor, scan, cloud, candidates, hypotheses, params, .. } = self;
         cloud.predict(moved, &params.drift);
         cloud.weigh(floor, scan);
         cloud.hypotheses(hypotheses);
