@@ -30,27 +30,18 @@ mod params;
 pub use candidates::{MOST_PLACES, Place};
 pub use params::FloorParams;
 
-use types::Pose;
 use types::chance::Stream;
+use types::messages::LandmarkSighting;
+use types::{Pose, Time};
 
 use crate::floor::Distances;
-use crate::linear::{Matrix, diagonal};
+use crate::linear::{Matrix, deviations, diagonal};
+use crate::localisation::State;
+use crate::localisation::landmarks::{Believer, Effect, Errors, Filter, Parameters, Sight, Watch};
 use crate::matching::{Geometry, MatchParams, NoMatch, Scan, match_carefully};
 use crate::monte_carlo::{Hypothesis, MOST_HYPOTHESES, MonteCarlo};
 use belief::Belief;
 use candidates::Candidates;
-
-/// What is known of where the robot is.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum State {
-    /// Not known, and nothing is seen by which it could be found.
-    Lost,
-    /// Not known; it is searched for.
-    #[default]
-    Searching,
-    /// Known.
-    Tracking,
-}
 
 /// What became of a scan.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -164,6 +155,24 @@ impl<F: Distances> FloorLocalizer<F> {
         let moved = self.moved(odometry);
         self.predict(odometry, moved);
         (self.state, self.is_fixed) = (State::Lost, false);
+    }
+
+    /// Takes what was seen of landmarks at a time, when the wheels said that the robot is at `odometry`. Gives whether anything in it told where that
+    /// is. A place that landmarks tell in a search is as one that [somebody says](FloorLocalizer::place): the next scan must confirm it.
+    pub fn sees(&mut self, watch: &mut Watch, at: Time, odometry: Pose, seen: &[LandmarkSighting]) -> bool {
+        let moved = self.moved(odometry);
+        self.predict(odometry, moved);
+        let (parameters, is_known) = (*watch.parameters(), self.state == State::Tracking);
+        let mut believer = Corrected { belief: &mut self.belief, parameters, is_known };
+        let told = watch.take(at, odometry, seen, &mut believer);
+        if let Some((pose, spread)) = told.found {
+            let (place, heading) = deviations(&spread);
+            self.place(pose, place, heading);
+        }
+        if told.fitted > 0 {
+            self.misses = 0;
+        }
+        told.fitted > 0 || told.found.is_some()
     }
 
     /// Takes a pose that somebody else has measured for the time of the last scan, with the inverse of its covariance. Gives whether it was
@@ -310,6 +319,34 @@ impl<F: Distances> FloorLocalizer<F> {
             self.search(None);
         }
         Outcome::Searched
+    }
+}
+
+/// The belief, for sightings of landmarks.
+struct Corrected<'a> {
+    belief: &'a mut Belief,
+    parameters: Parameters,
+    is_known: bool,
+}
+
+impl Corrected<'_> {
+    /// A filter of which only the pose counts: lasting errors of wheels are not learnt here.
+    fn filter(&self) -> Filter {
+        let parameters = Parameters { usual: Errors::default(), ..self.parameters };
+        Filter::new(&parameters, self.belief.pose, self.belief.covariance)
+    }
+}
+
+impl Believer for Corrected<'_> {
+    fn belief(&self) -> Option<Filter> {
+        self.is_known.then(|| self.filter())
+    }
+
+    fn take(&mut self, sight: &Sight) -> Effect {
+        let mut filter = self.filter();
+        let effect = filter.correct(&self.parameters, sight);
+        *self.belief = Belief { pose: filter.pose(), covariance: filter.spread() };
+        effect
     }
 }
 

@@ -13,3 +13,15 @@
 
 pub mod floor;
 pub mod landmarks;
+
+/// What is known of where the robot is.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum State {
+    /// Not known, and nothing is seen by which it could be found.
+    Lost,
+    /// Not known; it is searched for.
+    #[default]
+    Searching,
+    /// Known.
+    Tracking,
+}

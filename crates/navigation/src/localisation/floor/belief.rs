@@ -1,12 +1,12 @@
 //! A pose and how sure it is.
 
-use libm::{sincos, sqrt};
+use libm::sincos;
 use types::Pose;
 use types::geometry::wrap;
 
 use super::FloorParams;
 use crate::drift::Drift;
-use crate::linear::{Matrix, Vector, ZERO, diagonal, dot, inverse, product, sum, through, times};
+use crate::linear::{Matrix, Vector, ZERO, deviations, diagonal, dot, inverse, product, sum, through, times};
 
 /// Deviations of a robot of which nothing is known (m, rad): as large as floors are.
 const UNKNOWN: (f64, f64) = (100.0, 10.0);
@@ -78,10 +78,7 @@ impl Belief {
 
     /// Deviations of the place along the axis in which it is larger (m), and of the heading (rad).
     pub(super) fn deviations(&self) -> (f64, f64) {
-        let [[a, b, _], [_, c, _], [_, _, heading]] = self.covariance;
-        let half = (a - c) / 2.0;
-        let largest = (a + c) / 2.0 + sqrt(half * half + b * b);
-        (sqrt(largest.max(0.0)), sqrt(heading.max(0.0)))
+        deviations(&self.covariance)
     }
 
     /// So far off (m) may be what is looked for.

@@ -98,6 +98,11 @@ impl LandmarkLocalizer {
         &self.parameters
     }
 
+    /// Goes by other parameters from now on.
+    pub fn set_parameters(&mut self, parameters: Parameters) {
+        self.parameters = parameters;
+    }
+
     /// From `at` on the robot goes at a speed (m/s) and a turn rate (rad/s), until it is told otherwise.
     ///
     /// # Errors
