@@ -1,6 +1,8 @@
 use super::*;
 use crate::floor::{FloorPlan, FreeFloor, PlanField};
 use crate::laboratory::{Roamer, flat};
+use crate::localisation::landmarks::sighting::seen_from;
+use crate::localisation::landmarks::{Mark, Marks};
 use crate::matching::deviation;
 use types::Point;
 use types::geometry::{PI, wrap};
@@ -224,4 +226,71 @@ fn dead_reckoning_goes_on_from_the_last_scan() {
     let predicted = localizer.pose_at(roamer.odometry.then(moved)).unwrap();
     let expected = localizer.pose().unwrap().then(moved);
     assert!(predicted.position().distance(expected.position()) < 1e-12);
+}
+
+/// Lets a robot in a corridor whose ends are farther away than its laser reaches drive in it for 20 m. Gives how far off it is at most, along and
+/// across.
+fn along_a_corridor(landmarks: bool) -> (f64, f64) {
+    let mut plan = FloorPlan::default();
+    plan.line(&[Point::new(-30.0, -1.0), Point::new(60.0, -1.0)]);
+    plan.line(&[Point::new(-30.0, 1.0), Point::new(60.0, 1.0)]);
+    let floor = PlanField::new(&plan).unwrap();
+    let mut roamer = Roamer::new(&floor, Pose::new(10.0, 0.1, 0.02), 3);
+    let mut localizer = lost(&floor, 3);
+    localizer.place(roamer.pose, 0.05, 0.05);
+    let marks = (0..10).map(|k| Mark { id: k + 1, at: Point::new(4.0 * f64::from(k), 0.9), facing: 0.0 });
+    let parameters = Parameters { range: 0.02, range_part: 0.0, bearing: 0.01, ..Parameters::default() };
+    let mut watch = Watch::new(Marks::new(marks.clone(), 2.0), parameters);
+    let mut worst = (0.0f64, 0.0f64);
+    for tenth in 0..250 {
+        let _ = go(&mut localizer, &mut roamer);
+        let draw = Stream::new(5, "landmarks").sample(tenth);
+        let seen = marks.clone().map(|mark| (mark.id, seen_from(roamer.pose, mark.at)));
+        let near = seen.filter(|(_, seen)| seen.range < 3.0 && seen.bearing.abs() < 0.6);
+        // None tells its name.
+        let told: Vec<_> = near
+            .map(|(id, seen)| LandmarkSighting {
+                range: (seen.range + 0.02 * draw.normal(2 * u64::from(id))) as f32,
+                bearing: (seen.bearing + 0.01 * draw.normal(2 * u64::from(id) + 1)) as f32,
+                ..LandmarkSighting::default()
+            })
+            .collect();
+        if landmarks {
+            localizer.sees(&mut watch, Time(200_000_000 * (1 + tenth as i64)), roamer.odometry, &told);
+        }
+        let pose = localizer.pose().expect("it is known");
+        let off = pose.position() - roamer.pose.position();
+        worst = (worst.0.max(off.x.abs()), worst.1.max(off.y.abs()));
+    }
+    worst
+}
+
+#[test]
+fn along_a_corridor_landmarks_tell_what_the_scan_does_not() {
+    let ((by_wheels, across), (along, still)) = (along_a_corridor(false), along_a_corridor(true));
+    assert!(by_wheels > 0.07, "a hundredth of the way: {by_wheels}");
+    // A landmark is told to 2 cm, and the last was seen less than 4 m ago, which the wheels tell to 4 cm.
+    assert!(along < 0.05, "{along}");
+    assert!(across < 0.02 && still < 0.02, "the walls tell that: {across} {still}");
+}
+
+#[test]
+fn two_landmarks_end_a_search_in_a_place_that_looks_like_another() {
+    // A hall that looks the same from both of its ends.
+    let floor = PlanField::new(&FloorPlan::room(6.0, 4.5)).unwrap();
+    let mut roamer = Roamer::new(&floor, Pose::new(2.0, 2.0, 0.3), 1);
+    let mut localizer = lost(&floor, 1);
+    (0..30).for_each(|_| assert_eq!(go(&mut localizer, &mut roamer), Outcome::Searched));
+    let places = [(1u32, Point::new(5.8, 4.3)), (2, Point::new(5.8, 0.2))];
+    let marks = places.map(|(id, at)| Mark { id, at, facing: 0.0 });
+    let parameters = Parameters { range: 0.02, range_part: 0.0, bearing: 0.01, ..Parameters::default() };
+    let mut watch = Watch::new(Marks::new(marks, 2.0), parameters);
+    let seen = places.map(|(id, at)| {
+        let seen = seen_from(roamer.pose, at);
+        let (range, bearing) = (seen.range as f32 + 0.01, seen.bearing as f32 - 0.005);
+        LandmarkSighting { id, range, bearing, side: 0 }
+    });
+    assert!(localizer.sees(&mut watch, Time::ZERO, roamer.odometry, &seen));
+    assert_eq!(go(&mut localizer, &mut roamer), Outcome::Fixed, "the next scan confirms it");
+    assert!(off(&localizer, &roamer) < 0.02, "{}", off(&localizer, &roamer));
 }

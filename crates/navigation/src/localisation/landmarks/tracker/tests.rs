@@ -127,10 +127,11 @@ fn wheels_alone_would_be_lost_and_the_error_of_the_wheels_is_learnt() {
     robot.tour(&mut tracker, 1200);
     let drifted = by_wheels(&robot).position().distance(robot.pose.position());
     assert!(drifted > 1.0, "{drifted} m");
-    // On a circle an error of turns and one that goes with the way look the same; together they take back what the wheels tell too much.
+    // On a circle an error of turns and one that goes with the way look the same; together they take back what the wheels tell too much. In 48 m
+    // it shows to 0.005 rad/s through the noise of the wheels, and before was known to 0.0087: three quarters of it are believed.
     let (errors, told) = (tracker.filter().errors(), 0.01 * 0.4 / 0.36);
-    let mended = errors.turn * (0.2 + told) + errors.curve * 0.4;
-    assert!((mended + told).abs() < 0.2 * told, "{mended} rad/s for {told}");
+    let mended = -(errors.turn * (0.2 + told) + errors.curve * 0.4) / told;
+    assert!((0.55..0.95).contains(&mended), "{mended} of it");
 }
 
 #[test]
