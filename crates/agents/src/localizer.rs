@@ -131,7 +131,11 @@ fn whole(params: &LocalizerParams, read: &Table) -> Vec<Mistake> {
             mistakes
                 .push(Mistake::new(Default::default(), "a localizer needs a floor or landmarks").help(help));
         }
-        (Some(entry), _) if params.floor.is_empty() && FloorPlan::from_value(&entry.value).is_some() => {
+        (Some(entry), _)
+            if params.floor.is_empty()
+                && params.landmarks.is_empty()
+                && FloorPlan::from_value(&entry.value).is_some() =>
+        {
             let mistake = Mistake::new(entry.at, "nothing stands on this floor");
             mistakes.push(mistake.help("a robot is found by walls, discs and boxes"));
         }
@@ -280,13 +284,11 @@ impl Agent for Localizer {
                 tell(stamp, Some(known), tracker.told());
             }
         }
-        if let Some(received) = scan.newest() {
+        let heard = scan.newest().and_then(|received| {
             let stamp = received.header().stamp;
-            let Some(moved) = wheels(stamp) else { return Ok(()) };
-            if let Some(known) = tracker.hear(&received, received.row(), moved, stamp) {
-                tell(stamp, known, tracker.told());
-            }
-        } else if let Some((stamp, known)) = tracker.go_on(step.now, params.silence) {
+            Some((stamp, tracker.hear(&received, received.row(), wheels(stamp)?, stamp)?))
+        });
+        if let Some((stamp, known)) = heard.or_else(|| tracker.go_on(step.now, params.silence)) {
             tell(stamp, known, tracker.told());
         }
         Ok(())
