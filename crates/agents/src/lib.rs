@@ -14,6 +14,7 @@
 //! | [`wall_follower`] | ranges, odometry | a wish to drive along the wall |
 //! | [`image_tracker`] | HSI picture, head | the target, wishes for feet and head |
 //! | [`recogniser`] | a picture, head | whether a thing of a colour and shape is there, and where |
+//! | [`landmark_finder`] | a picture, head | where upright tubes of two colours stand |
 //! | [`path_planner`] | ranges, odometry | a way to a place, and how good it is |
 //! | [`goto`] | a task, odometry, the pose of a localizer | a wish to steer to a point, a pose or a dock |
 //! | [`mover`] | a task, odometry | a wish to drive a distance, an angle, a velocity for a time |
@@ -23,7 +24,7 @@
 //! | [`tour`] | places | the wish to go there, one after another |
 //! | [`process_supervisor`] | tasks, who lives | the mode: who is heard, and how |
 //! | [`real_time_supervisor`] | modes, tasks, reports of actions | the same for the real-time side, together; standing when one is silent |
-//! | [`localizer`] | scans, odometry, a floor plan | where the robot is on the floor, or that it is not known |
+//! | [`localizer`] | scans and a floor plan, landmarks and their places, odometry | where the robot is, or that it is not known |
 //! | [`avoid`] | a scan, ranges, a goal | a wish to drive past what is near, and the situation |
 //! | [`navigator`] | a scan, odometry, a goal | a motion to the goal through what nobody told it |
 //! | [`coordinator`] | wishes, safety, decision, mode | one command for the drive |
@@ -45,6 +46,7 @@ pub mod emergency_stop;
 pub mod goto;
 pub mod head;
 pub mod image_tracker;
+pub mod landmark_finder;
 pub mod laser;
 pub mod localizer;
 pub mod lookout;
@@ -74,6 +76,7 @@ pub use emergency_stop::EmergencyStopAction;
 pub use goto::GotoAction;
 pub use head::PanTilt;
 pub use image_tracker::ImageTracker;
+pub use landmark_finder::LandmarkFinder;
 pub use laser::Laser;
 pub use localizer::Localizer;
 pub use lookout::Lookout;
@@ -105,6 +108,7 @@ pub fn registry() -> runtime::Registry {
         WallFollower,
         ImageTracker,
         Recogniser,
+        LandmarkFinder,
         PathPlanner,
         GotoAction,
         MoveAction,
@@ -143,6 +147,7 @@ mod tests {
             "wall-follower",
             "image-tracker",
             "recogniser",
+            "landmark-finder",
             "path-planner",
             "goto",
             "move",

@@ -46,7 +46,7 @@ impl Default for ColourPattern {
 }
 
 impl ColourPattern {
-    fn colours(&self) -> ColourRange {
+    pub(crate) fn colours(&self) -> ColourRange {
         ColourRange {
             hue_from: self.hue_from.to_radians(),
             hue_to: self.hue_to.to_radians(),

@@ -13,7 +13,7 @@ use std::time::Instant;
 
 use navigation::drift::Drift;
 use navigation::floor::{Block, Distances, FloorPlan, PlanField};
-use navigation::localiser::{Localiser, LocaliserParams};
+use navigation::localisation::floor::{FloorLocalizer, FloorParams};
 use navigation::matching::{Geometry, MatchParams, Scan, match_scan};
 use navigation::monte_carlo::{MonteCarlo, MonteCarloParams};
 use types::chance::Stream;
@@ -45,12 +45,12 @@ fn main() {
 }
 
 fn track(floor: &PlanField, beams: usize) {
-    let mut localiser = Localiser::new(floor.clone(), LocaliserParams::default(), Stream::new(1, "speed"));
-    localiser.place(HERE, 0.1, 0.1);
+    let mut localizer = FloorLocalizer::new(floor.clone(), FloorParams::default(), Stream::new(1, "speed"));
+    localizer.place(HERE, 0.1, 0.1);
     let scans: Vec<Vec<f32>> = (0..64).map(|i| look(floor, beams, HERE, i)).collect();
     let geometry = geometry(beams);
     measure(&format!("  one correction of {beams} beams"), 2000, |i| {
-        localiser.update(HERE, &scans[i % scans.len()], &geometry)
+        localizer.update(HERE, &scans[i % scans.len()], &geometry)
     });
 }
 
@@ -75,12 +75,12 @@ fn cloud(floor: &PlanField, particles: usize) {
 fn search(floor: &PlanField) {
     let scans: Vec<Vec<f32>> = (0..12).map(|i| look(floor, 181, HERE, i)).collect();
     let geometry = geometry(181);
-    let mut localiser = Localiser::new(floor.clone(), LocaliserParams::default(), Stream::new(1, "speed"));
+    let mut localizer = FloorLocalizer::new(floor.clone(), FloorParams::default(), Stream::new(1, "speed"));
     measure("one round of a search", 240, |i| {
         if i % 11 == 0 {
-            localiser.forget();
+            localizer.forget();
         }
-        localiser.update(HERE, &scans[i % 12], &geometry)
+        localizer.update(HERE, &scans[i % 12], &geometry)
     });
 }
 

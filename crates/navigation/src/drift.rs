@@ -10,6 +10,7 @@
 //! with `k` (m) and the distance `b` of the wheels (m).
 
 use libm::{fabs, sin, sincos, sqrt};
+use motion::odometry::Increment;
 use types::Pose;
 use types::chance::Stream;
 
@@ -33,34 +34,25 @@ impl Default for Drift {
     }
 }
 
-/// A motion as an arc.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-struct Arc {
-    distance: f64,
-    turn: f64,
-}
-
-impl Arc {
-    /// The arc of a motion; backwards is negative.
-    fn of(moved: Pose) -> Arc {
-        let half = moved.heading / 2.0;
-        let (s, c) = sincos(half);
-        let chord = moved.x * c + moved.y * s;
-        let longer = if fabs(half) < 1e-4 { 1.0 + half * half / 6.0 } else { half / sin(half) };
-        Arc { distance: chord * longer, turn: moved.heading }
-    }
+/// The arc of a motion; backwards is negative.
+pub(crate) fn arc(moved: Pose) -> Increment {
+    let half = moved.heading / 2.0;
+    let (s, c) = sincos(half);
+    let chord = moved.x * c + moved.y * s;
+    let longer = if fabs(half) < 1e-4 { 1.0 + half * half / 6.0 } else { half / sin(half) };
+    Increment { distance: chord * longer, turn: moved.heading }
 }
 
 impl Drift {
     /// Variances of the ways of both wheels (m²).
-    fn wheels(&self, arc: Arc) -> (f64, f64) {
+    fn wheels(&self, arc: Increment) -> (f64, f64) {
         let half = arc.turn * self.track / 2.0;
         (self.wheel * fabs(arc.distance - half), self.wheel * fabs(arc.distance + half))
     }
 
     /// The covariance of a motion, in the frame in which it began.
     pub(crate) fn covariance(&self, moved: Pose) -> Matrix {
-        let arc = Arc::of(moved);
+        let arc = arc(moved);
         let (left, right) = self.wheels(arc);
         let (distance, turn) = ((left + right) / 4.0, (left + right) / (self.track * self.track));
         let both = (right - left) / (2.0 * self.track);
@@ -88,7 +80,7 @@ impl Drift {
 
     /// A motion as it may have been, by the draws 0 and 1 of a stream.
     pub(crate) fn draw(&self, moved: Pose, stream: Stream) -> Pose {
-        let arc = Arc::of(moved);
+        let arc = arc(moved);
         let (left, right) = self.wheels(arc);
         let (a, b) = stream.normals(0);
         let (left, right) = (sqrt(left) * a, sqrt(right) * b);

@@ -65,6 +65,13 @@ pub(crate) fn inverse(a: &Matrix) -> Option<Matrix> {
     Some(product(&transposed(&back), &back))
 }
 
+/// Of the covariance of a pose: deviations of the place along the axis in which it is larger (m), and of the heading (rad).
+pub(crate) fn deviations([[a, b, _], [_, c, _], [_, _, heading]]: &Matrix) -> (f64, f64) {
+    let half = (a - c) / 2.0;
+    let largest = (a + c) / 2.0 + sqrt(half * half + b * b);
+    (sqrt(largest.max(0.0)), sqrt(heading.max(0.0)))
+}
+
 /// The eigenvalues of a symmetric matrix and their directions (rows of length one), by Jacobi's rotations.
 pub(crate) fn directions(a: &Matrix) -> ([f64; 3], Matrix) {
     let (mut a, mut rows) = (*a, diagonal([1.0; 3]));

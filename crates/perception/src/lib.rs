@@ -11,6 +11,7 @@
 //! | [`motion`] | two intensity pictures | mask, number and centre of the changed pixels |
 //! | [`recognise`] | picture, colour and shape | the largest region that has both, from all pixels or some |
 //! | [`thin`] | picture | every n-th pixel of it, and regions of those in the whole |
+//! | [`tube`] | picture and two colours | the upright tubes that have both, one above the other |
 //! | [`target`] | blob and camera | bearing, elevation, share of the picture |
 //! | [`sonar`] | ring of ranges | filtered ranges, risk per direction |
 //! | [`local_map`] | echoes while the robot moves | where something is around it |
@@ -30,6 +31,7 @@ pub mod sonar;
 mod split;
 pub mod target;
 pub mod thin;
+pub mod tube;
 
 pub use picture::{Size, WrongLength};
 

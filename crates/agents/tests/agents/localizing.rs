@@ -10,8 +10,10 @@ use runtime::{
     registry,
 };
 use types::chance::Stream;
-use types::geometry::PI;
-use types::messages::{LaserScan, Localisation, Odometry, Placed, Placement, Whereabouts};
+use types::geometry::{PI, wrap};
+use types::messages::{
+    LandmarkSighting, Landmarks, LaserScan, Localisation, Odometry, Placed, Placement, Whereabouts,
+};
 use types::params::Params as _;
 use types::{Duration, Point, Pose, Time};
 
@@ -31,7 +33,10 @@ fn truth(time: Time) -> Pose {
     Pose::new(3.2 + 0.7 * angle.cos(), 2.0 + 0.7 * angle.sin(), angle + PI / 2.0)
 }
 
-/// A robot with a laser on a circle. Its odometry began elsewhere.
+/// What its camera can see: number and place.
+const MARKS: [(u32, f64, f64); 4] = [(3, 0.3, 0.2), (5, 5.8, 0.3), (7, 5.7, 3.8), (9, 0.2, 3.7)];
+
+/// A robot with a laser and a camera on a circle. Its odometry began elsewhere.
 #[derive(Agent)]
 struct Body {
     /// What its laser sees.
@@ -40,6 +45,8 @@ struct Body {
     /// Where its wheels say that it is.
     #[port(history = 64)]
     odometry: Output<Odometry>,
+    /// What its camera sees of landmarks.
+    landmarks: Output<Landmarks>,
     n: u64,
     field: Option<PlanField>,
 }
@@ -61,6 +68,15 @@ impl Agent for Body {
             return Ok(());
         }
         let draw = Stream::new(4, "laser").sample(self.n);
+        let seen = MARKS.map(|(id, x, y)| {
+            let way = Point::new(x, y) - pose.position();
+            let bearing = wrap(way.bearing() - pose.heading) + 0.01 * draw.normal(1000 + u64::from(id));
+            let range = way.norm() + 0.02 * draw.normal(2000 + u64::from(id));
+            LandmarkSighting { id, range: range as f32, bearing: bearing as f32, side: 0 }
+        });
+        let in_view = |seen: &LandmarkSighting| seen.bearing.abs() < 0.6;
+        let seen = seen.into_iter().filter(in_view).collect();
+        self.landmarks.send_as(envelope, Landmarks { frame: "base_link".into(), seen });
         self.scan.send_with(|scan, row| {
             scan.angle_min = (-PI / 2.0) as f32;
             scan.angle_step = (PI / (BEAMS - 1) as f64) as f32;
@@ -129,6 +145,7 @@ fn run(params: LocalizerParams, seconds: f64) -> (Report, Heard) {
     let witness = plan.add::<Witness>("witness", Default::default());
     plan.wire(&body.scan, &localizer.scan);
     plan.wire(&body.odometry, &localizer.odometry);
+    plan.wire(&body.landmarks, &localizer.landmarks);
     plan.wire(&localizer.pose, &witness.pose);
     plan.wire(&localizer.state, &witness.state);
     plan.wire(&witness.place, &localizer.place);
@@ -203,6 +220,46 @@ fn a_start_that_is_known_is_begun_from() {
     assert!(heard.states.iter().all(|(_, told)| told.is_known()));
 }
 
+fn rows() -> Vec<Vec<f64>> {
+    MARKS.iter().map(|(id, x, y)| vec![f64::from(*id), *x, *y]).collect()
+}
+
+#[test]
+fn by_landmarks_alone_it_finds_the_robot_keeps_it_and_sees_through_a_wrong_word_without_memory() {
+    let params = LocalizerParams { landmarks: rows(), ..LocalizerParams::default() };
+    let (report, heard) = run(params, 80.0);
+    let heard = heard.lock().unwrap();
+    let Told { poses, states, .. } = &*heard;
+    let off = |from: f64, to: f64| {
+        let within = poses.iter().filter(|(stamp, _)| (from..to).contains(&stamp.seconds()));
+        within.map(|(stamp, pose)| pose.position().distance(truth(*stamp).position())).fold(0.0, f64::max)
+    };
+    // It sees one landmark at a time: once around it has seen them all, and at 10 s it was told a wrong place.
+    assert!(states[0].1.state == Whereabouts::Searching && poses.len() > 400, "{}", poses.len());
+    // A sighting at 3 m is off by 2 cm and 3 cm; it is told to the agent to be off by as much again.
+    let (last, lost) = (off(65.0, 80.0), off(10.2, 11.0));
+    assert!(last < 0.12, "{last}");
+    assert!(lost > 0.5 || poses.iter().all(|(stamp, _)| !(10.2..11.0).contains(&stamp.seconds())), "{lost}");
+    assert!(states.iter().rev().take(100).all(|(_, told)| told.is_known() && told.inliers > 0.9));
+    assert!(report.view.allocations_watched, "by the allocator of this program");
+    let agent = report.view.agents.iter().find(|agent| agent.name == "localizer").unwrap();
+    assert_eq!(agent.counts.allocations, 0);
+}
+
+#[test]
+fn landmarks_that_cannot_be_are_told() {
+    let said = |landmarks: Vec<Vec<f64>>| {
+        let mut table = types::value::Table::new();
+        table.set("landmarks", types::params::ParamValue::to_value(&landmarks));
+        LocalizerParams::read(&table, "a localizer").err().map_or(0, |mistakes| mistakes.len())
+    };
+    assert_eq!(said(rows()), 0);
+    assert_eq!(said(vec![vec![1.0, 2.0]]), 1);
+    assert_eq!(said(vec![vec![0.0, 2.0, 3.0]]), 1);
+    assert_eq!(said(vec![vec![1.0, 2.0, 3.0], vec![1.0, 4.0, 5.0]]), 1, "two with the same number");
+    assert_eq!(said(vec![vec![1.0, f64::NAN, 3.0]]), 1);
+}
+
 #[test]
 fn a_floor_is_needed_and_must_be_one() {
     let mut table = types::value::Table::new();
@@ -214,7 +271,7 @@ fn a_floor_is_needed_and_must_be_one() {
             .collect::<Vec<_>>()
     };
     assert!(
-        said(&table)[0].starts_with("a localizer needs a floor; write floor = \"world\""),
+        said(&table)[0].starts_with("a localizer needs a floor or landmarks; write floor = \"world\""),
         "{:?}",
         said(&table)
     );

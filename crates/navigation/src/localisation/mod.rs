@@ -1,23 +1,27 @@
 //! Where the robot is: counting wheels, set right by what it sees of landmarks, of other robots and of walls.
 //!
-//! In plain words: wheels tell each small step well, but their errors add up; a landmark whose place is known tells little at a time, but
-//! its errors do not. A filter weighs the two by how much each is to be trusted, and learns meanwhile by how much the wheels are wrong.
-//! Who does not know at all where it is scatters guesses over the map and keeps those that agree with what it measures.
+//! In plain words: wheels tell each small step well, but their errors add up; a landmark or a wall whose place is known tells little at a
+//! time, but its errors do not. A filter weighs the two by how much each is to be trusted, and learns meanwhile by how much the wheels are
+//! wrong. Who does not know at all where it is scatters guesses over the map and keeps those that agree with what it measures.
 //!
 //! | module | from | to |
 //! |---|---|---|
-//! | [`filter`] | steps of the wheels | a pose, how uncertain it is, and the lasting errors of the wheels |
-//! | [`sighting`] | range and bearing of something, or from another robot | the filter set right |
-//! | [`association`] | a sighting of one does not know what | which landmark it is, if that can be told |
-//! | [`localizer`] | steps and sightings in any order of time | the pose at any time of the last seconds, and a little ahead |
+//! | [`floor`] | what the wheels say, and scans | where the robot is on a known floor, or that it is not known |
+//! | [`landmarks`] | what the wheels say, and sightings of landmarks and other robots | where it is, was and will be |
 //!
-//! A gyro comes in before: [`motion::heading`] fuses it with the wheels, learns its bias, and what it gives is a step of the wheels for the filter.
+//! A gyro comes in before: [`motion::heading`] fuses it with the wheels, learns its bias, and what it gives is a step of the wheels.
 
-pub mod association;
-pub mod filter;
-pub mod localizer;
-pub mod sighting;
+pub mod floor;
+pub mod landmarks;
 
-pub use filter::{Errors, Filter, Parameters};
-pub use localizer::Localizer;
-pub use sighting::{Effect, Sight, Sighting};
+/// What is known of where the robot is.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum State {
+    /// Not known, and nothing is seen by which it could be found.
+    Lost,
+    /// Not known; it is searched for.
+    #[default]
+    Searching,
+    /// Known.
+    Tracking,
+}

@@ -11,8 +11,8 @@ use std::path::{Path, PathBuf};
 
 use hardware::mrclam::Team;
 use motion::odometry::Increment;
-use navigation::localisation::association::Landmark;
-use navigation::localisation::{Filter, Parameters, Sighting};
+use navigation::localisation::landmarks::Landmark;
+use navigation::localisation::landmarks::{Filter, Parameters, Sighting};
 use record::figure::{Drawing, Map};
 use serde_json::json;
 use types::{Point, Pose};

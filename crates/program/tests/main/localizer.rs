@@ -93,10 +93,14 @@ impl Agent for Rover {
 
 /// What was told, and what was true.
 #[derive(Default)]
-struct Diary {
-    poses: Vec<(Time, Pose)>,
+pub(crate) struct Diary {
+    pub(crate) poses: Vec<(Time, Pose)>,
+    /// What another localizer of the same robot told.
+    pub(crate) others: Vec<(Time, Pose)>,
+    /// Where its wheels alone said that it is, in the frame in which it began.
+    pub(crate) reckoned: Vec<(Time, Pose)>,
     states: Vec<(Time, Localisation)>,
-    truth: Vec<(Time, Pose)>,
+    pub(crate) truth: Vec<(Time, Pose)>,
 }
 
 /// Writes down what is told and what is true; at a time it puts the robot elsewhere.
@@ -104,6 +108,10 @@ struct Diary {
 struct Witness {
     /// Where the robot is believed to be.
     pose: Input<Odometry>,
+    /// Where another localizer believes it to be.
+    other: Input<Odometry>,
+    /// Where its wheels say that it is.
+    reckoned: Input<Odometry>,
     /// How sure that is.
     state: Input<Localisation>,
     /// Puts the robot elsewhere.
@@ -133,6 +141,12 @@ impl Agent for Witness {
         while let Some(pose) = self.pose.take() {
             diary.poses.push((pose.header().stamp, pose.pose));
         }
+        while let Some(pose) = self.other.take() {
+            diary.others.push((pose.header().stamp, pose.pose));
+        }
+        while let Some(pose) = self.reckoned.take() {
+            diary.reckoned.push((pose.header().stamp, pose.pose));
+        }
         while let Some(state) = self.state.take() {
             diary.states.push((state.header().stamp, *state));
         }
@@ -152,9 +166,9 @@ impl Diary {
         Pose::new(a.x + (b.x - a.x) * part, a.y + (b.y - a.y) * part, a.heading + turn * part)
     }
 
-    /// How far off the poses that were told from a time to another are (m), sorted, and the greatest error of the heading.
-    fn errors(&self, from: f64, to: f64) -> (Vec<f64>, f64) {
-        let within = self.poses.iter().filter(|(stamp, _)| (from..to).contains(&stamp.seconds()));
+    /// How far off poses are that were told from a time to another (m), sorted, and the greatest error of the heading.
+    pub(crate) fn off(&self, told: &[(Time, Pose)], from: f64, to: f64) -> (Vec<f64>, f64) {
+        let within = told.iter().filter(|(stamp, _)| (from..to).contains(&stamp.seconds()));
         let off = within.map(|(stamp, pose)| {
             let truth = self.truth_at(*stamp);
             (pose.position().distance(truth.position()), wrap(pose.heading - truth.heading).abs())
@@ -164,7 +178,16 @@ impl Diary {
         (places, headings.into_iter().fold(0.0, f64::max))
     }
 
-    fn states(&self, from: f64, to: f64) -> impl Iterator<Item = Whereabouts> + '_ {
+    fn errors(&self, from: f64, to: f64) -> (Vec<f64>, f64) {
+        self.off(&self.poses, from, to)
+    }
+
+    /// The way of the robot (m).
+    pub(crate) fn way(&self) -> f64 {
+        self.truth.windows(2).map(|pair| pair[0].1.position().distance(pair[1].1.position())).sum()
+    }
+
+    pub(crate) fn states(&self, from: f64, to: f64) -> impl Iterator<Item = Whereabouts> + '_ {
         let within = self.states.iter().filter(move |(stamp, _)| (from..to).contains(&stamp.seconds()));
         within.map(|(_, told)| told.state)
     }
@@ -180,10 +203,21 @@ fn run(
     requests: &str,
     seconds: i64,
 ) -> Arc<Mutex<Diary>> {
+    let text = format!("{}\n{requests}", SYSTEM.replace("START", start));
+    play(&text, BEGIN, seed, carry, seconds)
+}
+
+/// Runs a system with the robot h1 and a witness, from where it begins.
+pub(crate) fn play(
+    text: &str,
+    begin: Pose,
+    seed: u64,
+    carry: Option<(f64, Pose)>,
+    seconds: i64,
+) -> Arc<Mutex<Diary>> {
     let mut types = registry();
     types.extend([AgentType::of::<Rover>(), AgentType::of::<Witness>()]);
-    let text = format!("{}\n{requests}", SYSTEM.replace("START", start));
-    let loaded = file::read(&text, "localizing.toml", None, &[], &types)
+    let loaded = file::read(text, "localizing.toml", None, &[], &types)
         .unwrap_or_else(|mistakes| panic!("{mistakes}"));
     let (mut plan, mut mistakes) = (loaded.plan, Vec::new());
     let world = WorldPlan::read(&loaded.world.unwrap(), &mut mistakes).unwrap();
@@ -191,7 +225,7 @@ fn run(
     let elsewhere = ["driver", "start", "bumper_latches"];
     let model = Model::read(entry.value.as_table().unwrap(), entry.at, &elsewhere, &mut mistakes);
     assert!(mistakes.is_empty(), "{mistakes:?}");
-    let body = simulated::Robot { name: "h1".into(), model: model.unwrap(), start: BEGIN, goal: None };
+    let body = simulated::Robot { name: "h1".into(), model: model.unwrap(), start: begin, goal: None };
     let (mut drivers, truth) = simulated::raise(&world, seed, &[body]).unwrap();
     let (driver, diary) = (drivers.remove(0), Arc::<Mutex<Diary>>::default());
     let carry = carry.map(|(time, pose)| (Time::from_seconds(time), pose));
@@ -224,7 +258,7 @@ fn run(
 
 const KNOWN: &str = "known_start = true\nx = 2.02\ny = 3.17\nheading = 0.43";
 
-fn quantile(sorted: &[f64], part: f64) -> f64 {
+pub(crate) fn quantile(sorted: &[f64], part: f64) -> f64 {
     sorted[((sorted.len() - 1) as f64 * part) as usize]
 }
 
@@ -232,8 +266,7 @@ fn quantile(sorted: &[f64], part: f64) -> f64 {
 fn with_wheels_that_are_wrong_and_furniture_that_was_moved_it_is_right_to_a_centimetre() {
     let diary = run(3, KNOWN, None, "", 60);
     let diary = diary.lock().unwrap();
-    let way: f64 =
-        diary.truth.windows(2).map(|pair| pair[0].1.position().distance(pair[1].1.position())).sum();
+    let way = diary.way();
     assert!(way > 8.0, "it drove about: {way} m");
     let (places, heading) = diary.errors(0.0, 60.0);
     let (half, most, worst) = (quantile(&places, 0.5), quantile(&places, 0.95), quantile(&places, 1.0));

@@ -1,8 +1,8 @@
 //! Lets every robot of a recording believe, and judges what it believes.
 
 use hardware::mrclam::{Member, Seen, Team};
-use navigation::localisation::association::{Association, Landmark};
-use navigation::localisation::{Filter, Localizer, Parameters, Sight, Sighting};
+use navigation::localisation::landmarks::{Association, Landmark};
+use navigation::localisation::landmarks::{Filter, LandmarkLocalizer, Parameters, Sight, Sighting};
 use types::geometry::wrap;
 use types::{Duration, Point, Pose, Time};
 
@@ -74,7 +74,7 @@ enum Kind {
 /// A robot that believes.
 struct Believer<'a> {
     member: &'a Member,
-    localizer: Localizer,
+    localizer: LandmarkLocalizer,
     wheels: Wheels,
     judge: Judge,
     sights: usize,
@@ -159,7 +159,7 @@ fn start<'a>(member: &'a Member, setup: &Setup) -> Result<Believer<'a>, Failure>
     let filter = Filter::new(&setup.parameters, pose, known);
     Ok(Believer {
         member,
-        localizer: Localizer::new(setup.parameters, filter, at, MEMORY),
+        localizer: LandmarkLocalizer::new(setup.parameters, filter, at, MEMORY),
         wheels: Wheels { pose, at, rates: [0.0; 2] },
         judge: Judge::default(),
         sights: 0,

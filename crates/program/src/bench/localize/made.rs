@@ -8,8 +8,8 @@
 //! | sight | 0.6 rad to either side, 6 m, three pictures a second, eight seconds of every minute blind |
 
 use hardware::mrclam::{Mark, Member, Rates, Seen, Team};
-use navigation::localisation::Sighting;
-use navigation::localisation::sighting::seen_from;
+use navigation::localisation::landmarks::Sighting;
+use navigation::localisation::landmarks::sighting::seen_from;
 use types::chance::Stream;
 use types::geometry::{TAU, wrap};
 use types::{Point, Pose, Time};

@@ -1,12 +1,12 @@
 //! A pose and how sure it is.
 
-use libm::{sincos, sqrt};
+use libm::sincos;
 use types::Pose;
 use types::geometry::wrap;
 
-use super::LocaliserParams;
+use super::FloorParams;
 use crate::drift::Drift;
-use crate::linear::{Matrix, Vector, ZERO, diagonal, dot, inverse, product, sum, through, times};
+use crate::linear::{Matrix, Vector, ZERO, deviations, diagonal, dot, inverse, product, sum, through, times};
 
 /// Deviations of a robot of which nothing is known (m, rad): as large as floors are.
 const UNKNOWN: (f64, f64) = (100.0, 10.0);
@@ -78,14 +78,11 @@ impl Belief {
 
     /// Deviations of the place along the axis in which it is larger (m), and of the heading (rad).
     pub(super) fn deviations(&self) -> (f64, f64) {
-        let [[a, b, _], [_, c, _], [_, _, heading]] = self.covariance;
-        let half = (a - c) / 2.0;
-        let largest = (a + c) / 2.0 + sqrt(half * half + b * b);
-        (sqrt(largest.max(0.0)), sqrt(heading.max(0.0)))
+        deviations(&self.covariance)
     }
 
     /// So far off (m) may be what is looked for.
-    pub(super) fn reach(&self, params: &LocaliserParams) -> f64 {
+    pub(super) fn reach(&self, params: &FloorParams) -> f64 {
         const LEVER: f64 = 3.0;
         let (place, heading) = self.deviations();
         (0.1 + 3.0 * (place + LEVER * heading)).min(params.matching.reach)

@@ -17,13 +17,13 @@ fn millis(at: i64) -> Time {
     Time(at * 1_000_000)
 }
 
-fn start(memory: usize) -> Localizer {
+fn start(memory: usize) -> LandmarkLocalizer {
     let parameters = Parameters::default();
     let spread = [[0.01, 0.0, 0.0], [0.0, 0.01, 0.0], [0.0, 0.0, 0.01]];
-    Localizer::new(parameters, Filter::new(&parameters, Pose::default(), spread), Time::ZERO, memory)
+    LandmarkLocalizer::new(parameters, Filter::new(&parameters, Pose::default(), spread), Time::ZERO, memory)
 }
 
-fn tell(localizer: &mut Localizer, at: Time, told: Told) {
+fn tell(localizer: &mut LandmarkLocalizer, at: Time, told: Told) {
     match told {
         Told::Drives(linear, angular) => localizer.drives(at, linear, angular).unwrap(),
         Told::Sees(which, range) => {
@@ -33,7 +33,7 @@ fn tell(localizer: &mut Localizer, at: Time, told: Told) {
     }
 }
 
-fn agree(a: &Localizer, b: &Localizer) -> Result<(), TestCaseError> {
+fn agree(a: &LandmarkLocalizer, b: &LandmarkLocalizer) -> Result<(), TestCaseError> {
     let (x, y) = (a.newest(), b.newest());
     prop_assert_eq!(x.0, y.0);
     prop_assert!((x.1.state - y.1.state).norm() < 1e-9, "{:?} and {:?}", x.1.pose(), y.1.pose());
@@ -123,11 +123,11 @@ proptest! {
 }
 
 /// Drives a square with wheels that are wrong, and sees landmarks with noise; gives where it was and where it believes to have been.
-fn square(parameters: Parameters, known_ids: bool) -> (Localizer, Vec<(Pose, Pose)>) {
+fn square(parameters: Parameters, known_ids: bool) -> (LandmarkLocalizer, Vec<(Pose, Pose)>) {
     let stream = Stream::new(11, "square");
     let spread = [[1e-4, 0.0, 0.0], [0.0, 1e-4, 0.0], [0.0, 0.0, 1e-4]];
     let mut localizer =
-        Localizer::new(parameters, Filter::new(&parameters, Pose::default(), spread), Time::ZERO, 64);
+        LandmarkLocalizer::new(parameters, Filter::new(&parameters, Pose::default(), spread), Time::ZERO, 64);
     let landmarks = PLACES.map(Landmark::exact);
     let (mut truth, mut poses) = (Pose::default(), Vec::new());
     for k in 0i64..6000 {

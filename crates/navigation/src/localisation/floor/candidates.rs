@@ -4,7 +4,7 @@ use libm::sincos;
 use types::geometry::wrap;
 use types::{Point, Pose};
 
-use super::{Fix, LocaliserParams};
+use super::{Fix, FloorParams};
 use crate::floor::Distances;
 use crate::linear::{Matrix, ZERO};
 use crate::matching::{Beam, Scan, match_carefully};
@@ -54,7 +54,7 @@ impl Place {
     }
 
     /// Lays a scan over the floor from here. Gives whether it fits.
-    fn fit(&mut self, floor: &impl Distances, scan: &Scan, params: &LocaliserParams) -> bool {
+    fn fit(&mut self, floor: &impl Distances, scan: &Scan, params: &FloorParams) -> bool {
         let found = match_carefully(floor, scan, self.pose, &params.matching).ok();
         let found = found.filter(|found| found.inliers >= params.inliers_sure * 0.75);
         let Some(found) = found else { return false };
@@ -109,7 +109,7 @@ impl Candidates {
     }
 
     /// Lays the scan over the floor from each place.
-    pub(super) fn follow(&mut self, floor: &impl Distances, scan: &Scan, params: &LocaliserParams) {
+    pub(super) fn follow(&mut self, floor: &impl Distances, scan: &Scan, params: &FloorParams) {
         for place in &mut self.places {
             if !place.fit(floor, scan, params) {
                 place.misses += 1;
@@ -126,13 +126,7 @@ impl Candidates {
     }
 
     /// Follows also a place that somebody proposes, if it fits and is none that is followed.
-    pub(super) fn propose(
-        &mut self,
-        floor: &impl Distances,
-        scan: &Scan,
-        pose: Pose,
-        params: &LocaliserParams,
-    ) {
+    pub(super) fn propose(&mut self, floor: &impl Distances, scan: &Scan, pose: Pose, params: &FloorParams) {
         if self.places.iter().any(|place| place.is_same(pose)) {
             return;
         }
@@ -160,7 +154,7 @@ impl Candidates {
     }
 
     /// The one place that fits, if no other fits as well.
-    pub(super) fn winner(&self, params: &LocaliserParams) -> Option<Fix> {
+    pub(super) fn winner(&self, params: &FloorParams) -> Option<Fix> {
         let (best, others) = self.places.split_first()?;
         let is_sure = best.fitted >= params.fitted && best.inliers >= params.inliers_sure && best.unseen == 0;
         let is_alone = others.iter().all(|other| best.over(other) > params.margin);

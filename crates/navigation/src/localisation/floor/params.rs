@@ -6,7 +6,7 @@ use crate::monte_carlo::MonteCarloParams;
 
 /// How a robot is kept track of.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct LocaliserParams {
+pub struct FloorParams {
     /// Radius of the robot (m): where it can be at all. 0.2.
     pub radius: f64,
     /// How its wheels err.
@@ -46,9 +46,9 @@ pub struct LocaliserParams {
     pub give_up: u32,
 }
 
-impl Default for LocaliserParams {
-    fn default() -> LocaliserParams {
-        LocaliserParams {
+impl Default for FloorParams {
+    fn default() -> FloorParams {
+        FloorParams {
             radius: 0.2,
             drift: Drift::default(),
             matching: MatchParams::default(),

@@ -18,39 +18,30 @@
 //! ```
 //!
 //! While it searches: a cloud ([`crate::monte_carlo`]) and draws from anywhere propose places; each is laid over the floor and followed
-//! from scan to scan. It is decided when one fits and no other fits as well ([`Localiser::places`] tells them); on a floor that looks the same from
+//! from scan to scan. It is decided when one fits and no other fits as well ([`FloorLocalizer::places`] tells them); on a floor that looks the same from
 //! two places that is never.
 //!
-//! A pose is given only right after a scan that fits. In between, dead reckoning goes on from there: [`Localiser::pose_at`].
+//! A pose is given only right after a scan that fits. In between, dead reckoning goes on from there: [`FloorLocalizer::pose_at`].
 
 mod belief;
 mod candidates;
 mod params;
 
 pub use candidates::{MOST_PLACES, Place};
-pub use params::LocaliserParams;
+pub use params::FloorParams;
 
-use types::Pose;
 use types::chance::Stream;
+use types::messages::LandmarkSighting;
+use types::{Pose, Time};
 
 use crate::floor::Distances;
-use crate::linear::{Matrix, diagonal};
+use crate::linear::{Matrix, deviations, diagonal};
+use crate::localisation::State;
+use crate::localisation::landmarks::{Believer, Effect, Errors, Filter, Parameters, Sight, Watch};
 use crate::matching::{Geometry, MatchParams, NoMatch, Scan, match_carefully};
 use crate::monte_carlo::{Hypothesis, MOST_HYPOTHESES, MonteCarlo};
 use belief::Belief;
 use candidates::Candidates;
-
-/// What is known of where the robot is.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum State {
-    /// Not known, and nothing is seen by which it could be found.
-    Lost,
-    /// Not known; it is searched for.
-    #[default]
-    Searching,
-    /// Known.
-    Tracking,
-}
 
 /// What became of a scan.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -71,9 +62,9 @@ pub enum Outcome {
 
 /// Where the robot is. All memory is taken when it is made: that of the floor, and 2 MB for 8000 particles.
 #[derive(Clone, Debug)]
-pub struct Localiser<F> {
+pub struct FloorLocalizer<F> {
     floor: F,
-    params: LocaliserParams,
+    params: FloorParams,
     state: State,
     belief: Belief,
     /// Where the wheels said that the robot is when the belief was true.
@@ -94,11 +85,11 @@ pub struct Localiser<F> {
     searched: u32,
 }
 
-impl<F: Distances> Localiser<F> {
+impl<F: Distances> FloorLocalizer<F> {
     /// Of a robot that may be anywhere.
-    pub fn new(floor: F, params: LocaliserParams, stream: Stream) -> Localiser<F> {
+    pub fn new(floor: F, params: FloorParams, stream: Stream) -> FloorLocalizer<F> {
         let cloud = MonteCarlo::new(&floor, params.radius, params.cloud, stream);
-        Localiser {
+        FloorLocalizer {
             floor,
             params,
             state: State::Searching,
@@ -132,8 +123,8 @@ impl<F: Distances> Localiser<F> {
     }
 
     /// Other parameters from now on. Those of the cloud stay.
-    pub fn set_params(&mut self, params: LocaliserParams) {
-        self.params = LocaliserParams { cloud: self.params.cloud, radius: self.params.radius, ..params };
+    pub fn set_params(&mut self, params: FloorParams) {
+        self.params = FloorParams { cloud: self.params.cloud, radius: self.params.radius, ..params };
     }
 
     /// Takes a scan, and where the wheels said that the robot was when it was taken (in any frame that does not jump).
@@ -164,6 +155,24 @@ impl<F: Distances> Localiser<F> {
         let moved = self.moved(odometry);
         self.predict(odometry, moved);
         (self.state, self.is_fixed) = (State::Lost, false);
+    }
+
+    /// Takes what was seen of landmarks at a time, when the wheels said that the robot is at `odometry`. Gives whether anything in it told where that
+    /// is. A place that landmarks tell in a search is as one that [somebody says](FloorLocalizer::place): the next scan must confirm it.
+    pub fn sees(&mut self, watch: &mut Watch, at: Time, odometry: Pose, seen: &[LandmarkSighting]) -> bool {
+        let moved = self.moved(odometry);
+        self.predict(odometry, moved);
+        let (parameters, is_known) = (*watch.parameters(), self.state == State::Tracking);
+        let mut believer = Corrected { belief: &mut self.belief, parameters, is_known };
+        let told = watch.take(at, odometry, seen, &mut believer);
+        if let Some((pose, spread)) = told.found {
+            let (place, heading) = deviations(&spread);
+            self.place(pose, place, heading);
+        }
+        if told.fitted > 0 {
+            self.misses = 0;
+        }
+        told.fitted > 0 || told.found.is_some()
     }
 
     /// Takes a pose that somebody else has measured for the time of the last scan, with the inverse of its covariance. Gives whether it was
@@ -287,7 +296,7 @@ impl<F: Distances> Localiser<F> {
         }
         self.misses = 0;
         self.searched += 1;
-        let Localiser { floor, scan, cloud, candidates, hypotheses, params, .. } = self;
+        let FloorLocalizer { floor, scan, cloud, candidates, hypotheses, params, .. } = self;
         cloud.predict(moved, &params.drift);
         cloud.weigh(floor, scan);
         cloud.hypotheses(hypotheses);
@@ -310,6 +319,34 @@ impl<F: Distances> Localiser<F> {
             self.search(None);
         }
         Outcome::Searched
+    }
+}
+
+/// The belief, for sightings of landmarks.
+struct Corrected<'a> {
+    belief: &'a mut Belief,
+    parameters: Parameters,
+    is_known: bool,
+}
+
+impl Corrected<'_> {
+    /// A filter of which only the pose counts: lasting errors of wheels are not learnt here.
+    fn filter(&self) -> Filter {
+        let parameters = Parameters { usual: Errors::default(), ..self.parameters };
+        Filter::new(&parameters, self.belief.pose, self.belief.covariance)
+    }
+}
+
+impl Believer for Corrected<'_> {
+    fn belief(&self) -> Option<Filter> {
+        self.is_known.then(|| self.filter())
+    }
+
+    fn take(&mut self, sight: &Sight) -> Effect {
+        let mut filter = self.filter();
+        let effect = filter.correct(&self.parameters, sight);
+        *self.belief = Belief { pose: filter.pose(), covariance: filter.spread() };
+        effect
     }
 }
 

@@ -74,7 +74,7 @@ struct Moment {
 
 /// Believes where the robot is and was.
 #[derive(Clone, Debug)]
-pub struct Localizer {
+pub struct LandmarkLocalizer {
     parameters: Parameters,
     /// In the order of time, never empty. The first is where all reckoning begins.
     moments: VecDeque<Moment>,
@@ -84,18 +84,23 @@ pub struct Localizer {
     known: Time,
 }
 
-impl Localizer {
+impl LandmarkLocalizer {
     /// Begins at a time with a belief, and remembers so many steps and sightings, at least two. All memory is taken here.
-    pub fn new(parameters: Parameters, start: Filter, at: Time, memory: usize) -> Localizer {
+    pub fn new(parameters: Parameters, start: Filter, at: Time, memory: usize) -> LandmarkLocalizer {
         let most = memory.max(2);
         let mut moments = VecDeque::with_capacity(most);
         moments.push_back(Moment { at, rates: Rates::default(), sight: None, after: start });
-        Localizer { parameters, moments, most, rates: Rates::default(), known: at }
+        LandmarkLocalizer { parameters, moments, most, rates: Rates::default(), known: at }
     }
 
     /// What it goes by.
     pub const fn parameters(&self) -> &Parameters {
         &self.parameters
+    }
+
+    /// Goes by other parameters from now on.
+    pub fn set_parameters(&mut self, parameters: Parameters) {
+        self.parameters = parameters;
     }
 
     /// From `at` on the robot goes at a speed (m/s) and a turn rate (rad/s), until it is told otherwise.

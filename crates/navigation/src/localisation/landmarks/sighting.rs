@@ -41,6 +41,8 @@ pub enum Sight {
     OfRobot(Sighting, View),
     /// Another robot sees this one.
     FromRobot(Sighting, View),
+    /// The robot is about at a place, as well as its covariance says (m²): who hears a beacon is near it.
+    Near(Point, [[f64; 2]; 2]),
 }
 
 /// What a robot tells others, so that they know where it is and what its sightings mean.
@@ -64,7 +66,7 @@ pub struct Effect {
 }
 
 impl Effect {
-    const NONE: Effect = Effect { surprise: f64::INFINITY, used: false, moved: 0.0 };
+    pub(super) const NONE: Effect = Effect { surprise: f64::INFINITY, used: false, moved: 0.0 };
 }
 
 /// A sighting as the filter sees it.
@@ -106,6 +108,9 @@ impl Filter {
     /// What is expected, and the noise of it.
     pub(super) fn expect(&self, parameters: &Parameters, sight: &Sight) -> Option<(Expected, Two)> {
         let (seen, other, spread) = match sight {
+            Sight::Near(at, [[xx, xy], [yx, yy]]) => {
+                return Some((self.nearness(*at), Two::new(*xx, *xy, *yx, *yy)));
+            }
             Sight::Of(seen, at, [[xx, xy], [yx, yy]]) => {
                 let spread = SMatrix::<f64, 3, 3>::new(*xx, *xy, 0.0, *yx, *yy, 0.0, 0.0, 0.0, 0.0);
                 (seen, Pose::new(at.x, at.y, 0.0), spread)
@@ -126,6 +131,13 @@ impl Filter {
             noise += Two::new(body * body, 0.0, 0.0, body * body / (far * far));
         }
         Some((expected, noise + spread_of_other))
+    }
+
+    fn nearness(&self, at: Point) -> Expected {
+        let mut gradient = Gradient::zeros();
+        (gradient[(0, 0)], gradient[(1, 1)]) = (1.0, 1.0);
+        let innovation = SVector::<f64, 2>::new(at.x - self.state[0], at.y - self.state[1]);
+        Expected { gradient, by_other: SMatrix::zeros(), innovation }
     }
 
     fn geometry(&self, seen: Sighting, other: Pose, is_seen: bool) -> Option<Expected> {
