@@ -7,7 +7,7 @@ use record::log::{Message, RunInfo};
 use types::cdr::Reader;
 use types::message::Message as Typed;
 use types::messages::{
-    Decision, Echoes, Grant, LaserScan, Motion, Odometry, Report, Task, Transforms, Twist,
+    Decision, Echoes, Grant, LaserScan, Odometry, Report, Task, Transforms, Twist,
 };
 use types::{Point, Pose, Time};
 
