@@ -111,13 +111,17 @@ impl Whereabouts {
     }
 
     /// Where a task leads, in the frame of the wheels; nothing without a task, or where nobody knows where the map is.
-    pub(crate) fn goal(&self, task: &Task) -> Option<Point> {
-        let goal = task.target.position();
+    pub(crate) fn target(&self, task: &Task) -> Option<Pose> {
         match task.frame.as_str() {
             _ if task.number == 0 => None,
-            ODOM => Some(goal),
-            _ => Some(self.map_from_odometry?.inverse().transform(goal)),
+            ODOM => Some(task.target),
+            _ => Some(self.map_from_odometry?.inverse().then(task.target)),
         }
+    }
+
+    /// The place of it.
+    pub(crate) fn goal(&self, task: &Task) -> Option<Point> {
+        self.target(task).map(Pose::position)
     }
 
     fn correct(&mut self, map: Pose, odometry: Pose, stamp: Time) {

@@ -17,10 +17,13 @@
 //! | [`landmark_finder`] | a picture, head | where upright tubes of two colours stand |
 //! | [`path_planner`] | ranges, odometry | a way to a place, and how good it is |
 //! | [`goto`] | a task, odometry, the pose of a localizer | a wish to steer to a point, a pose or a dock |
-//! | [`mover`] | a task, odometry | a wish to drive a distance, an angle, a velocity for a time |
+//! | [`mover`] | a task, odometry | a wish to drive a distance, an angle, a velocity for a time, or to a place |
 //! | [`path_follower`] | a task, a path, odometry | a wish to drive along the path |
+//! | [`along_wall`] | a task, ranges | a wish to drive along a wall at a distance |
+//! | [`escape`] | a task, odometry, ranges | a wish to get out where the robot does not come on, or that there is no way |
 //! | [`emergency_stop`] | scan, ranges, how the robot moves | a bound that ramps it down before what it would meet |
 //! | [`navigation`] | goals and manoeuvres of people and programs | tasks, and what becomes of them |
+//! | [`teleoperator`] | orders of people | the same for the drive, and that people drive |
 //! | [`tour`] | places | the wish to go there, one after another |
 //! | [`process_supervisor`] | tasks, who lives | the mode: who is heard, and how |
 //! | [`real_time_supervisor`] | modes, tasks, reports of actions | the same for the real-time side, together; standing when one is silent |
@@ -37,12 +40,14 @@
 #![forbid(unsafe_code)]
 
 mod action;
+pub mod along_wall;
 pub mod avoid;
 pub mod camera;
 pub mod coordinator;
 pub mod decision_maker;
 pub mod drive;
 pub mod emergency_stop;
+pub mod escape;
 pub mod goto;
 pub mod head;
 pub mod image_tracker;
@@ -63,16 +68,19 @@ pub mod resource_manager;
 pub mod safety_monitor;
 mod shared;
 pub mod sonar;
+pub mod teleoperator;
 pub mod tour;
 mod trust;
 pub mod wall_follower;
 
+pub use along_wall::AlongWall;
 pub use avoid::Avoid;
 pub use camera::Camera;
 pub use coordinator::Coordinator;
 pub use decision_maker::DecisionMaker;
 pub use drive::DriveBase;
 pub use emergency_stop::EmergencyStopAction;
+pub use escape::EscapeAction;
 pub use goto::GotoAction;
 pub use head::PanTilt;
 pub use image_tracker::ImageTracker;
@@ -92,6 +100,7 @@ pub use recogniser::Recogniser;
 pub use resource_manager::ResourceManager;
 pub use safety_monitor::SafetyMonitor;
 pub use sonar::Sonar;
+pub use teleoperator::Teleoperator;
 pub use tour::Tour;
 pub use wall_follower::WallFollower;
 
@@ -113,8 +122,11 @@ pub fn registry() -> runtime::Registry {
         GotoAction,
         MoveAction,
         PathFollower,
+        AlongWall,
+        EscapeAction,
         EmergencyStopAction,
         Navigation,
+        Teleoperator,
         Tour,
         ProcessSupervisor,
         RealTimeSupervisor,
@@ -152,8 +164,11 @@ mod tests {
             "goto",
             "move",
             "path-follower",
+            "along-wall",
+            "escape",
             "emergency-stop",
             "navigation",
+            "teleoperator",
             "tour",
             "process-supervisor",
             "real-time-supervisor",

@@ -1,4 +1,4 @@
-//! Move: a velocity for a time, a distance, an angle; by a profile, with the loop closed over the wheels.
+//! Move: a velocity for a time, a distance, an angle, a place; by a profile, with the loop closed over the wheels.
 
 use motion::manoeuvre::{self, Manoeuvre, Move, Outcome};
 use motion::profile::Bounds;
@@ -8,7 +8,7 @@ use types::params::Params;
 use types::value::{Mistake, Table};
 use types::{Text, Time};
 
-use crate::action::{Duty, NOTHING, bounded, offer};
+use crate::action::{Duty, NOTHING, Whereabouts, bounded, offer};
 
 /// What a motion may do.
 #[derive(Clone, Debug, Params)]
@@ -91,6 +91,8 @@ pub struct MoveAction {
     task: Input<Task>,
     /// Where the robot is by its wheels.
     odometry: Input<Odometry>,
+    /// Where it is on the map, from the localizer, for places of the map: what it knows when it sets off counts.
+    pose: Input<Odometry>,
     /// How it wishes to drive.
     drive: Output<Offer>,
     /// How far it has come.
@@ -98,7 +100,9 @@ pub struct MoveAction {
     report: Output<Report>,
     params: MoveParams,
     duty: Duty,
-    manoeuvre: Option<Manoeuvre>,
+    place: Whereabouts,
+    /// What it drives, or why it cannot.
+    manoeuvre: Option<Result<Manoeuvre, Progress>>,
     /// Odometry as one reading gave it: what is held to a plan must not be predicted from the plan's own commands.
     measured: Option<Odometry>,
 }
@@ -108,9 +112,11 @@ impl Agent for MoveAction {
         let now = step.now;
         self.duty.listen(&mut self.mode, &mut self.task);
         self.measured = self.odometry.latest().or(self.measured);
+        self.place.listen(&mut self.odometry, &mut self.pose, now);
         let task = self.duty.task(step.name_of(step.agent).unwrap_or_default().as_str());
-        let task =
-            task.filter(|task| matches!(task.motion, Motion::Velocity | Motion::Distance | Motion::Turn));
+        let is_mine =
+            |motion| matches!(motion, Motion::Velocity | Motion::Distance | Motion::Turn | Motion::To);
+        let task = task.filter(|task| is_mine(task.motion));
         let (is_new, dt) = (self.duty.is_new(task.as_ref(), now), self.duty.dt(now));
         let Some(task) = task else {
             self.manoeuvre = None;
@@ -118,7 +124,7 @@ impl Agent for MoveAction {
             return Ok(());
         };
         if is_new {
-            self.manoeuvre = begin(&self.params, &task);
+            self.manoeuvre = Some(begin(&self.params, &task, &self.place));
         }
         let (twist, report) = self.advance(&task, dt, now);
         self.drive.send(offer(twist, now));
@@ -127,21 +133,27 @@ impl Agent for MoveAction {
     }
 }
 
-fn begin(params: &MoveParams, task: &Task) -> Option<Manoeuvre> {
+fn begin(params: &MoveParams, task: &Task, place: &Whereabouts) -> Result<Manoeuvre, Progress> {
     let wanted = match task.motion {
+        Motion::To => {
+            let target = place.target(task).ok_or(Progress::Lost)?;
+            Move::To { point: target.position(), heading: task.turned.then_some(target.heading) }
+        }
         Motion::Distance => Move::Distance(task.distance),
         Motion::Turn => Move::Turn(task.angle),
         _ => Move::Velocity { twist: Twist::new(task.linear, task.angular), seconds: task.seconds },
     };
-    Manoeuvre::new(params.parameters(task), wanted).ok()
+    Manoeuvre::new(params.parameters(task), wanted).map_err(|_| Progress::Refused)
 }
 
 impl MoveAction {
     fn advance(&mut self, task: &Task, dt: f64, now: Time) -> (Twist, Report) {
         let seconds = self.duty.seconds(now);
         let report = Report { task: task.number, progress: Progress::Underway, seconds, ..Report::default() };
-        let Some(manoeuvre) = &mut self.manoeuvre else {
-            return (Twist::ZERO, Report { progress: Progress::Refused, ..report });
+        let manoeuvre = match &mut self.manoeuvre {
+            Some(Ok(manoeuvre)) => manoeuvre,
+            Some(Err(why)) => return (Twist::ZERO, Report { progress: *why, ..report }),
+            None => return (Twist::ZERO, report),
         };
         let Some(measured) = self.measured else { return (Twist::ZERO, report) };
         let gone = manoeuvre.step(measured.pose, dt);
@@ -167,7 +179,8 @@ mod tests {
     /// Drives a body that follows at once; gives where it ends, how, and the greatest speed.
     fn driven(params: &MoveParams, task: Task) -> (Pose, Progress, f64) {
         let mut agent = MoveAction { params: params.clone(), ..blank() };
-        agent.manoeuvre = begin(params, &task);
+        agent.place.map_from_odometry = Some(Pose::new(5.0, 1.0, types::geometry::PI / 2.0));
+        agent.manoeuvre = Some(begin(params, &task, &agent.place));
         let (mut body, mut fastest) = (Pose::default(), 0.0_f64);
         for i in 0..3000 {
             let now = Time::ZERO + Duration::millis(20 * i);
@@ -188,10 +201,12 @@ mod tests {
             mode: Default::default(),
             task: Default::default(),
             odometry: Default::default(),
+            pose: Default::default(),
             drive: Default::default(),
             report: Default::default(),
             params: MoveParams::default(),
             duty: Duty::default(),
+            place: Whereabouts::default(),
             manoeuvre: None,
             measured: None,
         }
@@ -221,12 +236,34 @@ mod tests {
     }
 
     #[test]
+    fn a_place_of_the_map_is_driven_to_by_the_wheels_and_without_a_map_nobody_knows_where_that_is() {
+        // Odometry began at (5, 1) of the map, looking along its y: two metres ahead there is (5, 3), one to the left is (4, 1).
+        let target = Pose::new(4.0, 3.0, types::geometry::PI);
+        let task = Task { number: 1, motion: Motion::To, frame: "map".into(), target, ..Task::default() };
+        let (end, how, fastest) = driven(&MoveParams::default(), Task { turned: true, linear: 0.2, ..task });
+        assert_eq!(how, Progress::Arrived);
+        assert!(end.position().distance(types::Point::new(2.0, 1.0)) < 0.01, "{end:?}");
+        assert!(
+            (end.heading - types::geometry::PI / 2.0).abs() < 0.011 && fastest < 0.2 * 1.2 + 1e-9,
+            "{end:?}"
+        );
+        let (end, how, _) = driven(&MoveParams::default(), task);
+        assert_eq!(how, Progress::Arrived);
+        assert!((end.heading - 0.5f64.atan()).abs() < 0.02, "as it came: {end:?}");
+        let unknown = begin(&MoveParams::default(), &task, &Whereabouts::default());
+        assert_eq!(unknown.err(), Some(Progress::Lost));
+        let by_wheels = Task { frame: crate::odometry::ODOM.into(), ..task };
+        assert!(begin(&MoveParams::default(), &by_wheels, &Whereabouts::default()).is_ok());
+    }
+
+    #[test]
     fn what_cannot_be_driven_is_refused_and_what_is_held_is_told() {
         let fast = Task { number: 1, motion: Motion::Velocity, linear: 2.0, seconds: 1.0, ..Task::default() };
         assert_eq!(driven(&MoveParams::default(), fast).1, Progress::Refused);
         let params = MoveParams::default();
         let task = Task { number: 1, motion: Motion::Distance, distance: 2.0, ..Task::default() };
-        let mut agent = MoveAction { manoeuvre: begin(&params, &task), ..blank() };
+        let mut agent = blank();
+        agent.manoeuvre = Some(begin(&params, &task, &agent.place));
         agent.measured = Some(Odometry::default());
         let held =
             (0..500).map(|i| agent.advance(&task, 0.02, Time::ZERO + Duration::millis(20 * i)).1.progress);

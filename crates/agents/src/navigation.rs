@@ -1,14 +1,16 @@
-//! The navigation module: takes goals and manoeuvres of people and programs, makes tasks of them, and tells what becomes of them.
+//! The navigation module: takes goals, manoeuvres and walls of people and programs, makes tasks of them, and tells what becomes of them.
 //!
 //! ```text
-//!  go, drive, halt ──▶ is that possible? ──▶ task ──▶ process supervisor ──▶ real-time supervisor ──▶ actions
-//!                                            └────▶ path planner
+//!  go, drive, wall, halt ──▶ is that possible? ──▶ task ──▶ process supervisor ──▶ real-time supervisor ──▶ actions
+//!                                                  └────▶ path planner
 //!  pose of the localizer, path of the planner ──▶ no way, for too long? ──▶ halt
 //!  status of the real-time supervisor ──▶ report
 //! ```
 
 use runtime::{Agent, Fault, Input, Output, Service, Step};
-use types::messages::{Answer, Goal, Halt, Manoeuvre, Motion, Odometry, Path, Progress, Report, Task};
+use types::messages::{
+    Answer, Goal, Halt, Manoeuvre, Motion, Odometry, Path, Progress, Report, Task, WallWish,
+};
 use types::params::Params;
 use types::{Duration, Name, Pose, Time};
 
@@ -23,9 +25,12 @@ pub struct NavigationParams {
     /// The mode in which it follows planned paths; a goal that names this mode waits for a path.
     #[param(default = "path")]
     pub path_mode: Name,
-    /// The mode in which it does manoeuvres without a place.
+    /// The mode in which it does manoeuvres without a place; a goal that names this mode is driven to by the wheels alone.
     #[param(default = "move")]
     pub move_mode: Name,
+    /// The mode in which it follows walls.
+    #[param(default = "wall-following")]
+    pub wall_mode: Name,
     /// The mode in which it docks.
     #[param(default = "goto")]
     pub dock_mode: Name,
@@ -47,10 +52,12 @@ pub struct NavigationParams {
 #[derive(Agent)]
 #[agent(kind = "navigation")]
 pub struct Navigation {
-    /// To a place, as in sinew call navigation.go x=3 y=1; turned=true heading=1.57 for the heading at the end, dock=true for a centimetre.
+    /// To a place, as in sinew call navigation.go x=3 y=1; turned=true heading=1.57 for the heading at the end, dock=true for a centimetre; mode=path along a planned way, mode=move straight and by the wheels alone.
     go: Service<Goal, Answer>,
     /// Without a place: sinew call navigation.drive distance=1, or angle=1.57, or linear=0.2 angular=0.1 seconds=5.
     drive: Service<Manoeuvre, Answer>,
+    /// Along a wall, as in sinew call navigation.wall side=right distance=0.7 seconds=60.
+    wall: Service<WallWish, Answer>,
     /// Ends what is being done: the robot ramps down and stands.
     halt: Service<Halt, Answer>,
     /// Where the robot is, from the localizer; where it does not know that, no goal is accepted.
@@ -86,6 +93,11 @@ impl Agent for Navigation {
             let made = self.desk.manoeuvre(&self.params, &manoeuvre);
             let answer = self.begin(made);
             self.drive.answer(&call, answer);
+        }
+        while let Some((wish, call)) = self.wall.take() {
+            let made = self.desk.wall(&self.params, &wish);
+            let answer = self.begin(made);
+            self.wall.answer(&call, answer);
         }
         while let Some((_, call)) = self.halt.take() {
             let task = self.desk.stand();
@@ -171,6 +183,7 @@ impl Desk {
         let motion = match dock {
             true => Motion::Dock,
             false if mode == params.path_mode => Motion::Path,
+            false if mode == params.move_mode => Motion::To,
             false => Motion::Goto,
         };
         self.no_way = (motion == Motion::Path).then_some(now);
@@ -210,6 +223,28 @@ impl Desk {
             distance,
             angle,
             seconds: within,
+            ..Task::default()
+        }))
+    }
+
+    fn wall(&mut self, params: &NavigationParams, wish: &WallWish) -> Result<Task, &'static str> {
+        let WallWish { side, distance, speed, seconds } = *wish;
+        if ![distance, speed, seconds].iter().all(|number| number.is_finite() && *number >= 0.0) {
+            return Err("distance, speed and seconds are positive, or zero for the robot's own");
+        }
+        let left = match side.as_str() {
+            "" | "left" => true,
+            "right" => false,
+            _ => return Err("the side of a wall is \"left\" or \"right\""),
+        };
+        self.no_way = None;
+        Ok(self.begin(Task {
+            mode: params.wall_mode,
+            motion: Motion::Wall,
+            linear: speed,
+            distance,
+            left,
+            seconds: if seconds > 0.0 { seconds } else { params.within.seconds() },
             ..Task::default()
         }))
     }
@@ -299,6 +334,13 @@ mod tests {
         assert_eq!((second.number, second.motion, second.seconds), (2, Motion::Path, 20.0));
         let dock = desk.goal(&params, &Goal { dock: true, ..goal(1.0, 1.0) }, at(0)).unwrap();
         assert_eq!((dock.motion, dock.turned, dock.mode.as_str()), (Motion::Dock, true, "goto"));
+        let to = desk.goal(&params, &Goal { mode: "move".into(), ..goal(1.0, 1.0) }, at(0)).unwrap();
+        assert_eq!((to.motion, to.mode.as_str(), to.frame.as_str()), (Motion::To, "move", "map"));
+        let wall =
+            desk.wall(&params, &WallWish { side: "right".into(), distance: 0.7, ..WallWish::default() });
+        let wall = wall.unwrap();
+        assert_eq!((wall.motion, wall.mode.as_str()), (Motion::Wall, "wall-following"));
+        assert_eq!((wall.left, wall.distance, wall.seconds), (false, 0.7, 300.0));
         let drive = |wish| Desk::default().manoeuvre(&params, &wish).map(|task| task.motion);
         let wish = Manoeuvre::default();
         assert_eq!(drive(Manoeuvre { linear: 0.2, seconds: 5.0, ..wish }), Ok(Motion::Velocity));
@@ -315,6 +357,9 @@ mod tests {
         assert!(refused(Goal { speed: -0.1, ..goal(1.0, 0.0) }).contains("positive"));
         let drive = |wish| Desk::default().manoeuvre(&params, &wish).unwrap_err();
         let wish = Manoeuvre::default();
+        let wall = |wish| Desk::default().wall(&params, &wish).unwrap_err();
+        assert!(wall(WallWish { side: "above".into(), ..WallWish::default() }).contains("\"left\" or"));
+        assert!(wall(WallWish { distance: -1.0, ..WallWish::default() }).contains("positive"));
         assert!(drive(wish).contains("say one of"));
         assert!(drive(Manoeuvre { distance: 1.0, angle: 1.0, ..wish }).contains("say one"));
         assert!(drive(Manoeuvre { seconds: -1.0, ..wish }).contains("positive"));

@@ -7,7 +7,7 @@ use types::messages::{
     Mode, Motion, Odometry, Offer, Path, Progress, Report, Safety, Task, Twist, WAYPOINTS,
 };
 use types::params::Params;
-use types::{Duration, Point, Pose, Sequence};
+use types::{Duration, Name, Point, Pose, Sequence};
 
 use crate::action::{Duty, NOTHING, Whereabouts, bounded, limits, offer};
 use crate::odometry::ODOM;
@@ -16,7 +16,7 @@ use crate::shared::Dated;
 /// How to follow.
 #[derive(Clone, Debug, Params)]
 pub struct FollowerParams {
-    /// Speed where nothing asks for less (m/s). 0.4 is a slow walk.
+    /// Highest speed (m/s), on a path without speeds the one where nothing asks for less. 0.4 is a slow walk.
     #[param(default = 0.4, min = 0.02, max = 10.0)]
     pub speed: f64,
     /// Highest turn rate (rad/s).
@@ -37,14 +37,14 @@ pub struct FollowerParams {
     /// It looks ahead at most so far (m): more, and it cuts doors.
     #[param(default = 0.9, min = 0.1, max = 10.0)]
     pub lookahead_most: f64,
-    /// In curves of a smaller radius than this it slows (m).
+    /// On a path without speeds it slows in curves of a smaller radius than this (m).
     #[param(default = 0.9, min = 0.0, max = 10.0)]
     pub curve_radius: f64,
     /// What is nearer to the rim than this slows it (m).
     #[param(default = 0.5, min = 0.0, max = 5.0)]
     pub proximity: f64,
-    /// Within this of the end of the path it is there (m).
-    #[param(default = 0.02, min = 0.002, max = 2.0)]
+    /// Within this of the end of the path it is there (m). 5 mm leave the other half of a centimetre to the localizer.
+    #[param(default = 0.005, min = 0.002, max = 2.0)]
     pub near: f64,
     /// The end of the path counts as the goal within this of it (m): a goal that stands in something is neared only so far, and that is told as unreachable.
     #[param(default = 0.15, min = 0.01, max = 5.0)]
@@ -110,7 +110,7 @@ impl Agent for PathFollower {
         let (is_new, dt) = (self.duty.is_new(task.as_ref(), now), self.duty.dt(now));
         if is_new {
             // A path to another goal leads elsewhere.
-            (self.way.path, self.way.got_on) = (None, None);
+            (self.way.course, self.way.got_on) = (None, None);
         }
         while let Some(path) = self.path.take() {
             if task.is_some() {
@@ -128,12 +128,24 @@ impl Agent for PathFollower {
     }
 }
 
+/// A path, in the form that the law takes.
+#[derive(Clone, Copy, Debug)]
+struct Course {
+    track: Track,
+    frame: Name,
+    /// Whether it ends before the goal.
+    cut: bool,
+    points: Sequence<Point, WAYPOINTS>,
+    /// Those at the points (m/s); none where the path has none.
+    speeds: Sequence<f64, WAYPOINTS>,
+}
+
 /// The path, and how far the robot is on it.
 #[derive(Clone, Copy, Debug, Default)]
 struct Way {
     place: Whereabouts,
     clearance: Option<Dated<f64>>,
-    path: Option<(Track, Path, Sequence<Point, WAYPOINTS>)>,
+    course: Option<Course>,
     last: Twist,
     /// Where it was last that it got on, by the wheels, and how long ago that is (s).
     got_on: Option<(Pose, f64)>,
@@ -157,17 +169,23 @@ impl Way {
     fn change(&mut self, params: &FollowerParams, path: &Path, task: Option<&Task>) {
         let Some(task) = task else { return };
         if !path.found {
-            self.path = None;
+            self.course = None;
             return;
         }
-        let points = path.points.iter().map(|point| Point::from(*point)).collect();
-        self.path = Some((Track::new(params.parameters(task), self.last), *path, points));
+        let is_timed = path.seconds > 0.0;
+        self.course = Some(Course {
+            track: Track::new(params.parameters(task), self.last),
+            frame: path.frame,
+            cut: path.cut,
+            points: path.points.iter().map(|point| Point::from(*point)).collect(),
+            speeds: path.points.iter().filter(|_| is_timed).map(|point| point.speed).collect(),
+        });
     }
 
     /// Where the robot is, in the frame of the path.
-    fn here(&self, path: &Path) -> Option<Pose> {
+    fn here(&self, course: &Course) -> Option<Pose> {
         let odometry = self.place.odometry?.pose;
-        if path.frame.as_str() == ODOM {
+        if course.frame.as_str() == ODOM {
             Some(odometry)
         } else {
             Some(self.place.map_from_odometry?.then(odometry))
@@ -175,9 +193,9 @@ impl Way {
     }
 
     /// The goal of a task, in the frame of the path.
-    fn goal(&self, path: &Path, task: &Task) -> Point {
+    fn goal(&self, course: &Course, task: &Task) -> Point {
         let goal = task.target.position();
-        if path.frame == task.frame || task.frame.is_empty() {
+        if course.frame == task.frame || task.frame.is_empty() {
             return goal;
         }
         self.place.map_from_odometry.map_or(goal, |map| map.inverse().transform(goal))
@@ -190,23 +208,23 @@ impl Way {
             return (Twist::ZERO, Report { progress: Progress::TimedOut, ..report });
         }
         let clearance = self.clearance.map_or(f64::INFINITY, |near| near.value.max(0.0));
-        let Some((mut track, path, points)) = self.path else {
+        let Some(mut course) = self.course else {
             self.last = Twist::ZERO;
             return (Twist::ZERO, report);
         };
-        let Some(here) = self.here(&path) else {
+        let Some(here) = self.here(&course) else {
             self.last = Twist::ZERO;
             return (Twist::ZERO, Report { progress: Progress::Lost, ..report });
         };
-        let gone = track.step(&points, here, clearance, dt);
-        self.path = Some((track, path, points));
+        let gone = course.track.step(&course.points, &course.speeds, here, clearance, dt);
+        self.course = Some(course);
         self.last = gone.twist;
         let odometry = self.place.odometry.map_or(here, |odometry| odometry.pose);
         let is_held = self.held(odometry, dt) > params.patience.seconds();
-        let left = here.position().distance(self.goal(&path, task));
+        let left = here.position().distance(self.goal(&course, task));
         let progress = match gone.mode {
             // A path that was cut goes on with the next.
-            Following::Arrived if path.cut => Progress::Underway,
+            Following::Arrived if course.cut => Progress::Underway,
             Following::Arrived if left > params.goal_near => Progress::Unreachable,
             Following::Arrived => Progress::Arrived,
             _ if is_held => Progress::Unreachable,

@@ -4,7 +4,11 @@
 //!  people ─▶ change ─┐                        ┌▶ mode ─▶ real-time supervisor
 //!  navigation ─▶ tasks ─┴─▶ table of modes ───┴▶ task ─▶
 //!  router: who lives ─────▶ somebody died ─▶ the mode's "dies"
+//!  people's hands ────────▶ the mode "teleoperation", and back when they let go
 //! ```
+//!
+//! While people drive by hand no action is heard. A task that has a place waits for them to let go and is then begun anew from where they
+//! left the robot; one without, such as to drive a metre, is over: half of it again would lead elsewhere.
 //!
 //! It belongs to the ordinary side: it may take its time. That nobody drives on in the meantime the real-time supervisor sees to, which needs
 //! no table for it.
@@ -13,7 +17,7 @@ mod modes;
 
 use runtime::{Agent, AgentState, Composition, Fault, Input, Output, Router, Service, Step};
 use types::Name;
-use types::messages::{Answer, Mode, Progress, Report, Task};
+use types::messages::{Answer, ByHand, Mode, Motion, Progress, Report, Task};
 use types::params::Params;
 use types::value::{Mistake, Table, nearest};
 
@@ -28,6 +32,9 @@ pub struct ProcessParams {
     /// The mode in which it begins. "idle" moves nothing before somebody asks for it.
     #[param(default = "idle")]
     pub start: Name,
+    /// The mode in which people drive by hand, with nobody in it whose wishes would count. Where the table has none of that name the mode stays while they drive.
+    #[param(default = "teleoperation")]
+    pub by_hand: Name,
 }
 
 fn whole(params: &ProcessParams, read: &Table) -> Vec<Mistake> {
@@ -57,6 +64,10 @@ pub struct ProcessSupervisor {
     change: Service<Mode, Answer>,
     /// What is to be done, and in which mode.
     tasks: Input<Task>,
+    /// Whether people drive by hand.
+    hand: Input<ByHand>,
+    /// What becomes of the task: one that is over does not wait for people to let go.
+    status: Input<Report>,
     /// Who there is, and who lives.
     router: Router,
     /// The mode, whenever it changes and before each task.
@@ -68,6 +79,11 @@ pub struct ProcessSupervisor {
     params: ProcessParams,
     /// The mode that was told last.
     now: Option<Mode>,
+    /// The task that is being done.
+    doing: Task,
+    /// While people drive: the mode and the task that wait for them to let go.
+    waiting: Option<Task>,
+    is_by_hand: bool,
 }
 
 impl Agent for ProcessSupervisor {
@@ -79,10 +95,24 @@ impl Agent for ProcessSupervisor {
             let answer = self.asked(asked.name);
             self.change.answer(&call, answer);
         }
+        while let Some(status) = self.status.take() {
+            if status.task == self.doing.number && status.progress.is_over() {
+                self.doing = Task { mode: self.doing.mode, ..Task::default() };
+            }
+        }
+        while let Some(hand) = self.hand.take().map(|received| *received) {
+            match (hand.on, self.is_by_hand) {
+                (true, false) => self.take_over(),
+                (false, true) => self.give_back(),
+                _ => {}
+            }
+        }
         while let Some(task) = self.tasks.take().map(|received| *received) {
             if self.why_not(task.mode).is_none() {
-                self.enter(task.mode);
-                self.task.send(task);
+                match self.waiting.is_some() {
+                    true => self.wait(task),
+                    false => self.begin(task),
+                }
                 continue;
             }
             runtime::note!("a task is refused: its mode is not there, or an agent of it");
@@ -99,9 +129,9 @@ impl ProcessSupervisor {
         if let Some(why) = self.why_not(name) {
             return Answer { why: why.as_str().into(), ..Answer::default() };
         }
-        self.enter(name);
-        // A mode that is asked for by hand has no task: what was being done is over.
-        self.task.send(Task { mode: name, ..Task::default() });
+        // A mode that is asked for has no task: what was being done is over.
+        self.waiting = None;
+        self.begin(Task { mode: name, ..Task::default() });
         Answer { accepted: true, task: 0, why: "the mode has changed".into() }
     }
 
@@ -113,6 +143,39 @@ impl ProcessSupervisor {
         let system = self.router.system();
         missing(&known.mode, &system)
             .map(|agent| format!("the mode \"{name}\" needs \"{agent}\", which is not there or not alive"))
+    }
+
+    fn begin(&mut self, task: Task) {
+        self.enter(task.mode);
+        self.doing = task;
+        self.task.send(task);
+    }
+
+    /// People have taken the robot into their hands.
+    fn take_over(&mut self) {
+        self.is_by_hand = true;
+        if self.params.modes.find(self.params.by_hand.as_str()).is_none() {
+            return;
+        }
+        let mode = self.now.map_or(Name::new(IDLE), |now| now.name);
+        self.wait(after_hands(Task { mode, ..self.doing }));
+    }
+
+    /// Lets a task wait while people drive. It is still being done, as far as who asked for it is told.
+    fn wait(&mut self, task: Task) {
+        self.waiting = Some(task);
+        self.enter(self.params.by_hand);
+        self.task.send(Task { number: task.number, mode: self.params.by_hand, ..Task::default() });
+    }
+
+    /// They have let go of it.
+    fn give_back(&mut self) {
+        self.is_by_hand = false;
+        let Some(task) = self.waiting.take() else { return };
+        match self.why_not(task.mode) {
+            None => self.begin(task),
+            Some(_) => self.begin(Task { mode: Name::new(IDLE), ..Task::default() }),
+        }
     }
 
     fn enter(&mut self, name: Name) {
@@ -143,9 +206,17 @@ impl ProcessSupervisor {
         };
         if next != now.name {
             runtime::note!("somebody whom the mode needs has died: another mode");
-            self.enter(next);
-            self.task.send(Task { mode: next, ..Task::default() });
+            self.begin(Task { mode: next, ..Task::default() });
         }
+    }
+}
+
+/// What is left of a task after people have driven the robot elsewhere: all of one that has a place, and of another no more than its mode.
+fn after_hands(task: Task) -> Task {
+    match task.motion {
+        motion if motion.has_place() => task,
+        Motion::Wall => task,
+        _ => Task { mode: task.mode, ..Task::default() },
     }
 }
 

@@ -22,6 +22,9 @@ pub struct TourParams {
     /// What is drawn depends on it alone.
     #[param(default = 1u64)]
     pub seed: u64,
+    /// Whether to dock there, at those that have a heading; of those that are drawn all have one then.
+    #[param(default = false)]
+    pub dock: bool,
     /// The mode in which it goes there; empty for the choice of the navigation module.
     pub mode: Name,
     /// Between the end of one and the next (time): the robot stands for so long.
@@ -60,7 +63,8 @@ impl TourParams {
         if let Some(place) = self.places.get(number) {
             let (x, y) = (*place.first()?, *place.get(1)?);
             let heading = place.get(2).copied();
-            return Some(Goal { x, y, heading: heading.unwrap_or(0.0), turned: heading.is_some(), ..goal });
+            let (turned, dock) = (heading.is_some(), heading.is_some() && self.dock);
+            return Some(Goal { x, y, heading: heading.unwrap_or(0.0), turned, dock, ..goal });
         }
         let [x0, y0, x1, y1] = self.area[..] else { return None };
         let drawn = number - self.places.len();
@@ -69,7 +73,8 @@ impl TourParams {
             x: x0 + (x1 - x0) * draw("tour/x"),
             y: y0 + (y1 - y0) * draw("tour/y"),
             heading: TAU * draw("tour/heading") - PI,
-            turned: drawn % 2 == 1,
+            turned: drawn % 2 == 1 || self.dock,
+            dock: self.dock,
             ..goal
         })
     }

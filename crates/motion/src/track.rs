@@ -15,6 +15,10 @@
 //! the gain g is 1 or less) and by the end (Macenski, Singh, Martín, Ginés, *Regulated pure pursuit for robot path tracking*, Autonomous
 //! Robots 2023).
 //!
+//! Where the path has speeds, they take the place of `wanted` and of the regulation by the curvature: who planned them has reckoned with
+//! curves and with braking. Between two points the square of the speed is linear along the path, as it is with a constant acceleration. What
+//! is near, the end, and the turn rate that the drive can do bound them all the same.
+//!
 //! The way along the path only grows: the nearest point is sought from that of the step before on, as far as one lookahead along the path
 //! or as the lookahead point. So a path may cross itself, or lead back beside itself, farther on than that. The lookahead point is sought
 //! from that of the step before, so that it does not leap between the places where a winding path leaves the circle. Where the path begins
@@ -162,11 +166,11 @@ impl Track {
     }
 
     /// The next order for a body at `pose`, `dt` (s) after the one before, on a path given in the same frame, with nothing nearer to the
-    /// body's edge than `clearance` (m, infinite for nothing).
-    pub fn step(&mut self, path: &[Point], pose: Pose, clearance: f64, dt: f64) -> Report {
+    /// body's edge than `clearance` (m, infinite for nothing). `speeds` are those at the points of the path (m/s), or none.
+    pub fn step(&mut self, path: &[Point], speeds: &[f64], pose: Pose, clearance: f64, dt: f64) -> Report {
         let mut report = self.look(path, pose);
         let wish = match report.mode {
-            Mode::Following => self.regulated(&report, clearance),
+            Mode::Following => self.regulated(&report, planned(speeds, self.place), clearance),
             Mode::Turning => {
                 let off = pose.inverse().transform(report.target).bearing();
                 saturated(
@@ -215,11 +219,14 @@ impl Track {
     }
 
     /// The speed that curve, obstacles and end leave, on the arc to the target.
-    fn regulated(&self, report: &Report, clearance: f64) -> Twist {
+    fn regulated(&self, report: &Report, planned: Option<f64>, clearance: f64) -> Twist {
         let p = &self.parameters;
-        let curve = 1.0 / fmax(fabs(report.curvature) * p.radius, 1.0);
-        let end = fmin(report.left / p.approach, 1.0);
-        let speed = fmin(fmax(p.speed * fmin(curve, end), p.creep), p.speed);
+        let end = p.speed * fmin(report.left / p.approach, 1.0);
+        let curve = match planned {
+            Some(planned) => fmin(planned, p.limits.angular_max / fmax(fabs(report.curvature), 1e-9)),
+            None => p.speed / fmax(fabs(report.curvature) * p.radius, 1.0),
+        };
+        let speed = fmin(fmax(fmin(curve, end), p.creep), p.speed);
         let stoppable = sqrt(2.0 * p.limits.deceleration * report.left);
         // What is not a number is nothing that one could trust in.
         let beside =
@@ -228,6 +235,15 @@ impl Track {
         let speed = fmin(speed * beside, stoppable);
         Twist::new(speed, speed * report.curvature)
     }
+}
+
+/// The speed at a place, where there are speeds (m/s).
+fn planned(speeds: &[f64], at: Place) -> Option<f64> {
+    let from = speeds.get(at.piece).copied()?;
+    let to = speeds.get(at.piece + 1).copied().unwrap_or(from);
+    let speed = sqrt(fmax(from * from + (to * to - from * from) * at.part, 0.0));
+    // What is no number is no speed with which one could drive.
+    Some(if speed.is_finite() { speed } else { 0.0 })
 }
 
 /// The piece from point `piece` on: where it begins, and the vector to its end. The last point is a piece of no length.

@@ -104,6 +104,8 @@ pub(crate) struct TaskOutcome {
     pub(crate) last: Report,
     /// How far the robot truly was from the place then, where the truth is known and the place is one of the map (m).
     pub(crate) off: Option<f64>,
+    /// And from its heading, where it has one (rad).
+    pub(crate) turned: Option<f64>,
 }
 
 /// What a log tells of how often agents ran.

@@ -15,7 +15,7 @@ fn parameters() -> Parameters {
 fn follow(p: Parameters, path: &[Point], start: Pose, mut see: impl FnMut(&Report, Pose)) -> Pose {
     let (mut track, mut pose) = (Track::new(p, Twist::ZERO), start);
     for _ in 0..20_000 {
-        let report = track.step(path, pose, f64::INFINITY, STEP);
+        let report = track.step(path, &[], pose, f64::INFINITY, STEP);
         see(&report, pose);
         if report.mode == Mode::Arrived && report.twist == Twist::ZERO {
             return pose;
@@ -38,7 +38,7 @@ fn on_a_circle_the_curvature_is_that_of_the_circle() {
             let mut track = Track::new(p, Twist::ZERO);
             track.place = Place { piece: (angle / TAU * 3600.0) as usize - 20, part: 0.0 };
             let pose = Pose::new(radius * cos(angle), radius * sin(angle), angle + PI / 2.0);
-            let report = track.step(&path, pose, f64::INFINITY, STEP);
+            let report = track.step(&path, &[], pose, f64::INFINITY, STEP);
             assert!(fabs(report.curvature * radius - 1.0) < 1e-4, "{radius} {reach}: {report:?}");
             assert!(fabs(report.target.distance(pose.position()) - reach) < 1e-9);
             assert!(fabs(report.across) < 1e-5, "{report:?}");
@@ -58,7 +58,7 @@ fn an_error_beside_a_line_decays_as_the_closed_form_says() {
         let s = i as f64 * 1e-3 * 0.3 / reach;
         let want = y0 * exp(-s) * (cos(s) + sin(s));
         assert!(fabs(pose.y - want) < 2e-5, "{i}: {} for {want}", pose.y);
-        let report = track.step(&path, pose, f64::INFINITY, 1e-3);
+        let report = track.step(&path, &[], pose, f64::INFINITY, 1e-3);
         assert!(fabs(report.across - pose.y) < 1e-12);
         pose = pose.advanced(report.twist.linear, report.twist.angular, 1e-3);
     }
@@ -137,7 +137,7 @@ fn curve_obstacle_and_end_slow_it_in_proportion() {
     let p = parameters();
     let track = Track::new(p, Twist::ZERO);
     let far = Report { left: 5.0, ..Report::default() };
-    let speed = |report: Report, clearance: f64| track.regulated(&report, clearance).linear;
+    let speed = |report: Report, clearance: f64| track.regulated(&report, None, clearance).linear;
     assert_eq!(speed(far, f64::INFINITY), 0.4);
     // A radius of 0.45 m is half of 0.9 m.
     assert!(fabs(speed(Report { curvature: -1.0 / 0.45, ..far }, 9.0) - 0.2) < 1e-12);
@@ -148,23 +148,59 @@ fn curve_obstacle_and_end_slow_it_in_proportion() {
 }
 
 #[test]
+fn where_the_path_has_speeds_it_drives_at_those_and_turns_no_faster_than_the_drive_can() {
+    let track = Track::new(parameters(), Twist::ZERO);
+    let far = Report { left: 5.0, ..Report::default() };
+    let speed = |report: Report, planned: f64| track.regulated(&report, Some(planned), f64::INFINITY).linear;
+    assert_eq!((speed(far, 0.23), speed(far, 9.0), speed(far, 0.0)), (0.23, 0.4, 0.05));
+    // A radius of 0.45 m would halve it without speeds; 1 rad/s is no bound there, and one on 0.2 m.
+    assert_eq!(speed(Report { curvature: 1.0 / 0.45, ..far }, 0.3), 0.3);
+    assert!(fabs(speed(Report { curvature: -5.0, ..far }, 0.3) - 0.2) < 1e-12);
+    assert!(fabs(speed(Report { left: 0.125, ..far }, 0.3) - 0.1) < 1e-12, "the end is the end");
+    // A quarter of the way up to 0.4 m/s with a constant acceleration it is half as fast.
+    let at = |speeds: &[f64], part: f64| planned(speeds, Place { piece: 0, part });
+    assert!(fabs(at(&[0.0, 0.4], 0.25).unwrap() - 0.2) < 1e-12);
+    assert_eq!((at(&[0.3, 0.3], 0.7), at(&[0.2], 0.5), at(&[], 0.5)), (Some(0.3), Some(0.2), None));
+    assert_eq!(at(&[0.3, f64::NAN], 0.7), Some(0.0));
+}
+
+#[test]
+fn a_path_with_speeds_is_driven_in_the_time_that_they_take() {
+    // 3 m up to 0.4 m/s and down again, with 0.1 m/s².
+    let path = [0.0, 0.8, 2.2, 3.0].map(|x| Point::new(x, 0.0));
+    let speeds = [0.0, 0.4, 0.4, 0.0];
+    let mut track = Track::new(Parameters { approach: 0.01, ..parameters() }, Twist::ZERO);
+    let (mut pose, mut seconds) = (Pose::default(), 0.0);
+    while !track.arrived && seconds < 60.0 {
+        let report = track.step(&path, &speeds, pose, f64::INFINITY, STEP);
+        let x = pose.x;
+        let planned = sqrt(fmin(fmin(0.2 * x, 0.2 * (3.0 - x)), 0.16));
+        assert!(report.twist.linear <= fmax(planned, 0.05) + 0.011, "{} at {x}", report.twist.linear);
+        pose = pose.advanced(report.twist.linear, report.twist.angular, STEP);
+        seconds += STEP;
+    }
+    // 4 s up, 3.5 s on, 4 s down; at the ends it creeps.
+    assert!((10.5..12.0).contains(&seconds), "{seconds}");
+}
+
+#[test]
 fn it_goes_on_from_what_something_else_drove() {
     let path = [Point::default(), Point::new(5.0, 0.0)];
     let mut track = Track::new(parameters(), Twist::ZERO);
     track.yielded(Twist::new(0.2, 0.0));
-    let report = track.step(&path, Pose::default(), f64::INFINITY, STEP);
+    let report = track.step(&path, &[], Pose::default(), f64::INFINITY, STEP);
     assert!(fabs(report.twist.linear - 0.21) < 1e-12, "{report:?}");
 }
 
 #[test]
 fn without_a_path_or_a_pose_it_brakes() {
     let mut track = Track::new(parameters(), Twist::new(0.3, 0.0));
-    let report = track.step(&[], Pose::default(), f64::INFINITY, STEP);
+    let report = track.step(&[], &[], Pose::default(), f64::INFINITY, STEP);
     assert!(report.mode == Mode::Lost && fabs(report.twist.linear - 0.28) < 1e-12, "{report:?}");
     let path = [Point::new(0.0, 0.0), Point::new(f64::NAN, 0.0)];
-    assert_eq!(track.step(&path, Pose::default(), 1.0, STEP).mode, Mode::Lost);
+    assert_eq!(track.step(&path, &[], Pose::default(), 1.0, STEP).mode, Mode::Lost);
     let pose = Pose::new(0.0, f64::NAN, 0.0);
-    assert_eq!(track.step(&[Point::default(); 2], pose, 1.0, STEP).mode, Mode::Lost);
+    assert_eq!(track.step(&[Point::default(); 2], &[], pose, 1.0, STEP).mode, Mode::Lost);
     // One point is a path too, and so is one that stands still.
     let there = Point::new(1.0, 0.5);
     for path in [&[there][..], &[there, there, there][..]] {
@@ -223,7 +259,7 @@ proptest! {
         let (mut track, mut pose, mut before) = (Track::new(p, Twist::ZERO), Pose::new(x, y, h), Report::default());
         let mut arrived = false;
         for _ in 0..10_000 {
-            let report = track.step(&path, pose, f64::INFINITY, STEP);
+            let report = track.step(&path, &[], pose, f64::INFINITY, STEP);
             let Report { twist, .. } = report;
             prop_assert!(twist.linear >= 0.0 && twist.linear <= p.speed + 1e-12 && fabs(twist.angular) <= 1.0 + 1e-12);
             prop_assert!(fabs(twist.linear - before.twist.linear) <= STEP + 1e-12);

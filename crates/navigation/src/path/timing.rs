@@ -7,14 +7,15 @@
 //!     A     C         v ≤ v_max,   v ≤ √(a_side r),   v ≤ ω_max r,   |dv/dt| ≤ a
 //! ```
 //!
-//! The arc lies in the triangle of B and the two places, so it is made so small that all cells which that triangle touches are open; it always can be, since B
+//! The arc lies in the triangle of B and the two places, so it is made so small that all cells which that triangle touches are open; it always can be, where B
 //! is the middle of an open cell. Where the way turns back, the robot stops and turns on the spot. The speeds at the joints are the
 //! greatest for which it can still brake for all that comes, and has been able to reach them: one pass forward, one backward (Bobrow, Dubowsky and
 //! Gibson 1985, in the simple case of constant limits).
 
 use types::{Point, Pose};
 
-use super::grid::{Cell, Grid};
+use super::grid::Grid;
+use super::smooth::is_open;
 
 /// What the drive can do on a way. All numbers are positive.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -86,6 +87,10 @@ pub struct TimeTable {
 const BACK: f64 = 2.0 * core::f64::consts::FRAC_PI_3;
 /// A turn by less than this is none (rad).
 const STRAIGHT: f64 = 1e-9;
+/// An arc becomes chords that turn by no more than this (rad): 20°, which cuts off 8 mm of one of half a metre.
+const CHORD: f64 = core::f64::consts::PI / 9.0;
+/// Points on a line that are nearer to each other than this are one (m).
+const CLOSE: f64 = 0.01;
 
 impl TimeTable {
     /// For ways with so many corners.
@@ -93,20 +98,21 @@ impl TimeTable {
         TimeTable { pieces: Vec::with_capacity(2 * corners + 2), duration: 0.0 }
     }
 
-    /// Makes the table for a way over open cells, from standing to standing. `corners` are what a [`Smoother`](super::Smoother) gives; a cell is `side` (m) wide. Without
-    /// two corners it is empty; corners for which it has no room are left out, so make it for as many as there can be.
-    pub fn plan(&mut self, grid: &Grid, corners: &[Cell], side: f64, limits: &DriveLimits) {
+    /// Makes the table for a way over open cells, from the speed that the robot has at `present` (m/s) to standing. `corners` are what
+    /// [`Smoother::lead`](super::Smoother::lead) gives (m); a cell is `side` (m) wide. Without two corners it is empty; corners for which it has no room are left out,
+    /// so make it for as many as there can be. Where there is no room to brake from the present speed, it begins with the one from which there is.
+    pub fn plan(&mut self, grid: &Grid, corners: &[Point], side: f64, limits: &DriveLimits, present: f64) {
         self.pieces.clear();
         self.duration = 0.0;
         let corners = &corners[..corners.len().min((self.pieces.capacity() - 2) / 2)];
         // How much of a line the corner at its beginning has taken (m).
         let mut taken = 0.0;
         for (i, two) in corners.windows(2).enumerate() {
-            let (a, b) = (middle(two[0], side), middle(two[1], side));
+            let (a, b) = (two[0], two[1]);
             let heading = (b - a).bearing();
             let whole = a.distance(b);
             let corner = corners.get(i + 2).map(|next| {
-                let c = middle(*next, side);
+                let c = *next;
                 let turn = types::geometry::wrap((c - b).bearing() - heading);
                 let most = limits.rounding.min(whole / 2.0).min(b.distance(c) / 2.0);
                 (turn, if turn.abs() > BACK { 0.0 } else { open_triangle(grid, [a, b, c], most, side) })
@@ -121,7 +127,7 @@ impl TimeTable {
             let at = b + Point::polar(-rounding, heading);
             self.push_corner(Pose::new(at.x, at.y, heading), turn, rounding, limits);
         }
-        self.speeds();
+        self.speeds(if present > 0.0 { present.min(limits.speed) } else { 0.0 });
         self.times();
     }
 
@@ -141,6 +147,14 @@ impl TimeTable {
         let next = self.pieces.partition_point(|piece| piece.begin <= time);
         let piece = self.pieces.get(next.saturating_sub(1))?;
         Some(piece.at(time - piece.begin))
+    }
+
+    /// The way as straight lines, with the speed at each point (m/s): between two points its square is linear along the line. What is cut off of the arcs lies in
+    /// the triangles at the corners as the arcs do.
+    pub fn points(&self) -> impl Iterator<Item = (Point, f64)> + '_ {
+        let moving = self.pieces.iter().filter(|piece| !piece.is_turn);
+        let end = moving.clone().next_back().map(|last| (last.pose(last.length).position(), last.leave));
+        moving.flat_map(Piece::points).chain(end)
     }
 
     fn push_line(&mut self, from: Pose, length: f64, limits: &DriveLimits) {
@@ -168,9 +182,9 @@ impl TimeTable {
         }
     }
 
-    /// The greatest speeds at the joints.
-    fn speeds(&mut self) {
-        let mut before = 0.0;
+    /// The greatest speeds at the joints, with the one at the beginning.
+    fn speeds(&mut self, present: f64) {
+        let mut before = self.pieces.first().map_or(0.0, |first| first.meets().min(present));
         for i in 0..self.pieces.len() {
             let next = self.pieces.get(i + 1).map_or(0.0, Piece::meets);
             let piece = &mut self.pieces[i];
@@ -223,6 +237,40 @@ impl Piece {
         libm::sqrt(square).min(self.most).max(self.enter).max(self.leave)
     }
 
+    /// Where it is after so much of its length.
+    fn pose(&self, gone: f64) -> Pose {
+        self.from.along_arc(gone, gone * self.curvature)
+    }
+
+    /// The speed after so much of its length (m/s).
+    fn speed(&self, gone: f64) -> f64 {
+        let from = |speed: f64, far: f64| libm::sqrt(speed * speed + 2.0 * self.acceleration * far.max(0.0));
+        from(self.enter, gone).min(from(self.leave, self.length - gone)).min(self.peak())
+    }
+
+    /// Its beginning and what lies within: of a line the places where it stops to grow faster and begins to brake, of an arc points that stand close.
+    fn points(&self) -> impl Iterator<Item = (Point, f64)> + '_ {
+        let square = |speed: f64| speed * speed / (2.0 * self.acceleration);
+        let peak = square(self.peak());
+        let line = [peak - square(self.enter), self.length - (peak - square(self.leave))];
+        let chords = libm::ceil(self.length * self.curvature.abs() / CHORD);
+        let inner = if self.curvature == 0.0 { 2 } else { (chords as usize).saturating_sub(1) };
+        let places = (0..inner).map(move |i| match self.curvature == 0.0 {
+            true => line[i],
+            false => self.length * (i + 1) as f64 / chords,
+        });
+        let mut before = 0.0;
+        let apart = move |gone: &f64| {
+            let is_apart = *gone > before + CLOSE && *gone < self.length - CLOSE;
+            before = if is_apart { *gone } else { before };
+            is_apart
+        };
+        [0.0]
+            .into_iter()
+            .chain(places.filter(apart))
+            .map(|gone| (self.pose(gone).position(), self.speed(gone)))
+    }
+
     /// How long it grows faster, keeps its speed, and brakes (s).
     fn spans(&self) -> [f64; 3] {
         let (peak, acceleration) = (self.peak(), self.acceleration);
@@ -254,13 +302,8 @@ impl Piece {
             let pose = Pose::new(self.from.x, self.from.y, heading);
             return Moment { pose, linear: 0.0, angular: speed * self.curvature };
         }
-        Moment { pose: self.from.along_arc(gone, turned), linear: speed, angular: speed * self.curvature }
+        Moment { pose: self.pose(gone), linear: speed, angular: speed * self.curvature }
     }
-}
-
-/// The middle of a cell (m).
-fn middle(cell: Cell, side: f64) -> Point {
-    Point::new((f64::from(cell.x) + 0.5) * side, (f64::from(cell.y) + 0.5) * side)
 }
 
 /// How far before a corner the way can leave it so that what is cut off lies in open cells: at most `most`, else a half of it, a quarter …
@@ -268,7 +311,7 @@ fn open_triangle(grid: &Grid, [a, b, c]: [Point; 3], most: f64, side: f64) -> f6
     let mut rounding = most;
     for _ in 0..12 {
         let (p, q) = (toward(b, a, rounding), toward(b, c, rounding));
-        if is_open(grid, [p, b, q].map(|at| Point::new(at.x / side - 0.5, at.y / side - 0.5))) {
+        if is_open(grid, [p, b, q], side) {
             return rounding;
         }
         rounding /= 2.0;
@@ -280,43 +323,11 @@ fn toward(from: Point, to: Point, far: f64) -> Point {
     from + Point::polar(far, (to - from).bearing())
 }
 
-/// Whether all cells that a triangle touches are open; in sides of a cell, from the middle of the first one. A cell counts where its middle is nearer to the triangle than
-/// its corners are: then more of them count than must.
-fn is_open(grid: &Grid, corners: [Point; 3]) -> bool {
-    let least = |of: fn(&Point) -> f64| corners.iter().map(of).fold(f64::INFINITY, f64::min);
-    let most = |of: fn(&Point) -> f64| corners.iter().map(of).fold(f64::NEG_INFINITY, f64::max);
-    let whole = |x: f64| libm::floor(x.max(0.0)) as u32;
-    let (columns, rows) = (
-        whole(least(|p| p.x) - 1.0)..=whole(most(|p| p.x) + 2.0),
-        whole(least(|p| p.y) - 1.0)..=whole(most(|p| p.y) + 2.0),
-    );
-    rows.into_iter().all(|y| {
-        columns.clone().all(|x| {
-            let at = Point::new(f64::from(x), f64::from(y));
-            !grid.is_closed(Cell::new(x, y)) || distance(at, corners) > core::f64::consts::FRAC_1_SQRT_2
-        })
-    })
-}
-
-/// How far a point is from a triangle; nothing inside.
-fn distance(at: Point, [a, b, c]: [Point; 3]) -> f64 {
-    let sides = [(a, b), (b, c), (c, a)];
-    let left = sides.map(|(p, q)| (q - p).cross(at - p) >= 0.0);
-    if left == [true; 3] || left == [false; 3] {
-        return 0.0;
-    }
-    let to_line = |(p, q): (Point, Point)| {
-        let (along, square) = ((at - p).dot(q - p), (q - p).dot(q - p));
-        let share = if square > 0.0 { (along / square).clamp(0.0, 1.0) } else { 0.0 };
-        at.distance(Point::new(p.x + (q.x - p.x) * share, p.y + (q.y - p.y) * share))
-    };
-    sides.map(to_line).into_iter().fold(f64::INFINITY, f64::min)
-}
-
 #[cfg(test)]
 mod tests {
+    use super::super::smooth::middle;
     use super::super::tests::floors;
-    use super::super::{Jump, Planner, Smoother};
+    use super::super::{Cell, Jump, Planner, Smoother};
     use super::*;
     use proptest::prelude::*;
 
@@ -330,9 +341,42 @@ mod tests {
     };
 
     fn table(grid: &Grid, corners: &[Cell], side: f64) -> TimeTable {
+        let corners: Vec<Point> = corners.iter().map(|cell| middle(*cell, side)).collect();
+        moving(grid, &corners, side, 0.0)
+    }
+
+    fn moving(grid: &Grid, corners: &[Point], side: f64, present: f64) -> TimeTable {
         let mut table = TimeTable::new(corners.len());
-        table.plan(grid, corners, side, &LIMITS);
+        table.plan(grid, corners, side, &LIMITS, present);
         table
+    }
+
+    #[test]
+    fn who_is_moving_goes_on_from_there_and_brakes_in_time() {
+        let grid = Grid::new(101, 3);
+        let way = |length: f64| [Point::new(0.05, 0.15), Point::new(0.05 + length, 0.15)];
+        // 10 m at 0.6 m/s: only braking is lost, 0.6 / 0.5 / 2.
+        let long = moving(&grid, &way(9.9), 0.1, 0.6);
+        assert!((long.duration() - (9.9 / 0.6 + 0.6)).abs() < 1e-9, "{}", long.duration());
+        // In 0.1 m it brakes from √(2 · 0.5 · 0.1), whatever it is told of the present.
+        for present in [0.4, 5.0] {
+            let short = moving(&grid, &way(0.1), 0.1, present);
+            assert!((short.at(0.0).unwrap().linear - 0.1f64.sqrt()).abs() < 1e-9, "{present}");
+        }
+        assert_eq!(moving(&grid, &way(1.0), 0.1, f64::NAN).at(0.0).unwrap().linear, 0.0);
+    }
+
+    #[test]
+    fn the_points_of_a_straight_way_are_where_its_speed_changes() {
+        let grid = Grid::new(101, 3);
+        // It is at 0.6 m/s after 0.36 m, and brakes 0.36 m before the end.
+        let points: Vec<(Point, f64)> =
+            table(&grid, &[Cell::new(0, 1), Cell::new(100, 1)], 0.1).points().collect();
+        let expected = [(0.05, 0.0), (0.41, 0.6), (9.69, 0.6), (10.05, 0.0)];
+        assert_eq!(points.len(), expected.len());
+        for ((point, speed), (x, v)) in points.iter().zip(expected) {
+            assert!((point.x - x).abs() < 1e-9 && (speed - v).abs() < 1e-6, "{points:?}");
+        }
     }
 
     #[test]
@@ -394,10 +438,10 @@ mod tests {
             let mut jump = Jump::new(grid.width(), grid.height());
             let Ok(path) = jump.plan(&grid, start, goal) else { return Ok(()) };
             let mut smoother = Smoother::new(grid.width(), grid.height());
-            let corners = smoother.smooth(&grid, path.cells());
+            let corners = smoother.lead(&grid, path.cells(), side, None, None);
             prop_assume!(corners.len() > 1);
-            let table = table(&grid, corners, side);
-            let straight: f64 = super::super::smooth::length(corners) * side;
+            let table = moving(&grid, corners, side, 0.0);
+            let straight: f64 = corners.windows(2).map(|two| two[0].distance(two[1])).sum();
             prop_assert!(table.length() <= straight + 1e-9 && table.duration() >= table.length() / LIMITS.speed);
             let step = 0.04;
             let count = libm::ceil(table.duration() / step) as usize + 1;
@@ -412,6 +456,22 @@ mod tests {
                 prop_assert!(moment.linear <= LIMITS.speed + 1e-9 && moment.linear >= -1e-9);
                 prop_assert!(moment.angular.abs() <= LIMITS.turn_rate + 1e-9);
                 prop_assert!((moment.linear * moment.angular).abs() <= LIMITS.sideways + 1e-9);
+            }
+            // The same of the straight lines that stand for it, with the square of the speed linear on each.
+            let points: Vec<(Point, f64)> = table.points().collect();
+            prop_assert!(points[0].0.distance(middle(start, side)) < 1e-9);
+            let longest = points.windows(2).map(|two| two[0].0.distance(two[1].0)).sum::<f64>();
+            prop_assert!(longest <= table.length() + 1e-9 && longest >= 0.98 * table.length());
+            for two in points.windows(2) {
+                let (way, squares) = (two[0].0.distance(two[1].0), two.iter().map(|(_, v)| v * v).collect::<Vec<_>>());
+                prop_assert!(squares[1].max(squares[0]) <= LIMITS.speed * LIMITS.speed + 1e-9);
+                // A chord is shorter than its arc, by half a hundredth at most.
+                prop_assert!((squares[1] - squares[0]).abs() <= 2.0 * LIMITS.acceleration * way * 1.006 + 1e-6, "{:?}", two);
+                for i in 0..=20 {
+                    let at = two[0].0 + (two[1].0 - two[0].0) * (f64::from(i) / 20.0);
+                    let cell = |at: f64| libm::floor(at / side) as u32;
+                    prop_assert!(!grid.is_closed(Cell::new(cell(at.x), cell(at.y))), "{:?}", two);
+                }
             }
             for two in moments.windows(2) {
                 let (gone, faster) = (two[0].pose.position().distance(two[1].pose.position()), two[1].linear - two[0].linear);

@@ -7,7 +7,7 @@ use record::log::{Message, RunInfo};
 use types::cdr::Reader;
 use types::message::Message as Typed;
 use types::messages::{
-    Decision, Echoes, Grant, LaserScan, Motion, Odometry, Report, Task, Transforms, Twist,
+    Decision, Echoes, Grant, LaserScan, Odometry, Report, Task, Transforms, Twist,
 };
 use types::{Point, Pose, Time};
 
@@ -305,8 +305,8 @@ impl Trail {
         let Some((last, _)) = decode::<Report>(message) else { return };
         let is_told = self.tasks.iter().any(|known| known.task == last.task);
         if last.task > 0 && last.progress.is_over() && !is_told {
-            let off = self.off(last.task);
-            self.tasks.push(TaskOutcome { task: last.task, at: time, last, off });
+            let (off, turned) = self.off(last.task);
+            self.tasks.push(TaskOutcome { task: last.task, at: time, last, off, turned });
         }
     }
 
@@ -316,14 +316,16 @@ impl Trail {
         }
     }
 
-    /// How far the only robot truly is from the place of a task, where that is one of the map (m).
-    fn off(&self, task: u32) -> Option<f64> {
-        let task = self.asked.get(&task)?;
-        let has_place = matches!(task.motion, Motion::Goto | Motion::Path | Motion::Dock);
+    /// How far the only robot truly is from the place of a task (m) and from its heading (rad), where that is one of the map.
+    fn off(&self, task: u32) -> (Option<f64>, Option<f64>) {
+        let on_map = |task: &&Task| task.motion.has_place() && task.frame.as_str() == agents::localizer::MAP;
+        let task = self.asked.get(&task).filter(on_map);
         let mut robots = self.robots.values().filter_map(|seen| seen.way.last());
-        let (Some((_, pose)), None) = (robots.next(), robots.next()) else { return None };
-        let is_true = has_place && task.frame.as_str() == agents::localizer::MAP;
-        is_true.then(|| pose.position().distance(task.target.position()))
+        let (Some(task), Some((_, pose)), None) = (task, robots.next(), robots.next()) else {
+            return (None, None);
+        };
+        let turned = types::geometry::wrap(pose.heading - task.target.heading).abs();
+        (Some(pose.position().distance(task.target.position())), task.turned.then_some(turned))
     }
 
     fn note(&mut self, time: f64, message: &Message) {

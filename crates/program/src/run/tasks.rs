@@ -11,7 +11,7 @@ pub(super) fn document(tasks: &[TaskOutcome]) -> Json {
         json!({
             "task": task.task, "ended": task.last.progress.word(), "at_s": task.at,
             "took_s": task.last.seconds, "left_m": task.last.distance, "left_rad": task.last.angle,
-            "off_m": task.off,
+            "off_m": task.off, "off_rad": task.turned,
         })
     };
     tasks.iter().map(row).collect()
@@ -43,6 +43,10 @@ pub(super) fn text(tasks: &[TaskOutcome]) -> Vec<String> {
             Some(off) => format!("{left}, in truth {off:.3} m"),
             None => left,
         };
+        let left = match task.turned {
+            Some(turned) => format!("{left} and {:.1}°", turned.to_degrees()),
+            None => left,
+        };
         format!(
             "{:>2} {:<12} at {:.2} s after {:.2} s, {left}",
             task.task,
@@ -54,20 +58,22 @@ pub(super) fn text(tasks: &[TaskOutcome]) -> Vec<String> {
     tasks.iter().enumerate().map(|(i, task)| named(i, line(task))).collect()
 }
 
-/// How far those that arrived truly were from their places.
-fn errors(tasks: &[TaskOutcome]) -> Option<String> {
+/// How far those that arrived truly were from their places and headings.
+fn errors(tasks: &[TaskOutcome]) -> impl Iterator<Item = String> {
     let arrived = tasks.iter().filter(|task| task.last.progress == Progress::Arrived);
-    let mut off: Vec<f64> = arrived.filter_map(|task| task.off).collect();
-    off.sort_by(f64::total_cmp);
-    let at = |share: f64| off[((off.len() - 1) as f64 * share).round() as usize] * 1e3;
-    (!off.is_empty()).then(|| {
-        format!(
-            "off in truth by {:.1} mm (median), {:.1} mm (99 %), {:.1} mm (most)",
-            at(0.5),
-            at(0.99),
-            at(1.0)
-        )
-    })
+    let sorted = |of: fn(&TaskOutcome) -> Option<f64>| {
+        let mut off: Vec<f64> = arrived.clone().filter_map(of).collect();
+        off.sort_by(f64::total_cmp);
+        off
+    };
+    let told = |off: &[f64], factor: f64, unit: &str| {
+        let at = |share: f64| off[((off.len() - 1) as f64 * share).round() as usize] * factor;
+        format!("{:.1}{unit} (median), {:.1}{unit} (99 %), {:.1}{unit} (most)", at(0.5), at(0.99), at(1.0))
+    };
+    let (off, turned) = (sorted(|task| task.off), sorted(|task| task.turned.map(f64::to_degrees)));
+    let ways = (!off.is_empty()).then(|| format!("off in truth by {}", told(&off, 1e3, " mm")));
+    let turns = (!turned.is_empty()).then(|| format!("turned off by {}", told(&turned, 1.0, "°")));
+    ways.into_iter().chain(turns)
 }
 
 #[cfg(test)]
@@ -77,7 +83,7 @@ mod tests {
 
     fn ended(task: u32, progress: Progress) -> TaskOutcome {
         let last = Report { task, progress, distance: 0.0071, angle: 0.01, seconds: 9.5 };
-        TaskOutcome { task, at: 12.5, last, off: Some(0.004) }
+        TaskOutcome { task, at: 12.5, last, off: Some(0.004), turned: Some(0.5f64.to_radians()) }
     }
 
     #[test]
@@ -85,13 +91,17 @@ mod tests {
         let few = [ended(1, Progress::Arrived), ended(2, Progress::TimedOut)];
         let told = text(&few);
         assert_eq!(told.len(), 2);
-        assert!(told[0].starts_with("  tasks ") && told[0].contains("arrived"), "{told:?}");
+        assert!(
+            told[0].starts_with("  tasks ") && told[0].ends_with("in truth 0.004 m and 0.5°"),
+            "{told:?}"
+        );
         assert!(told[1].contains("timed out") && told[1].contains("0.007 m and 0.6° left"), "{told:?}");
         assert_eq!(document(&few)[1]["ended"], "timed out");
         let many: Vec<_> = (0..30).map(|i| ended(i, Progress::Arrived)).chain(few).collect();
         let expected = [
             "  tasks        31 arrived, 1 timed out",
             "               off in truth by 4.0 mm (median), 4.0 mm (99 %), 4.0 mm (most)",
+            "               turned off by 0.5° (median), 0.5° (99 %), 0.5° (most)",
         ];
         assert_eq!(text(&many), expected);
     }

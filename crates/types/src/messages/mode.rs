@@ -47,6 +47,14 @@ pub struct ModeRow {
     pub priority: u32,
 }
 
+/// Whether people drive by hand.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Message)]
+#[repr(C)]
+pub struct ByHand {
+    /// They do, or have just done so.
+    pub on: bool,
+}
+
 /// The mode and what it means: who is heard, and how their wishes become one.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Message)]
 #[repr(C)]

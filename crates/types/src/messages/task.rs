@@ -42,6 +42,20 @@ pub struct Manoeuvre {
     pub angle: f64,
 }
 
+/// A wall to follow, as people and programs ask for it.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Message)]
+#[repr(C)]
+pub struct WallWish {
+    /// The side on which the wall is: "left" or "right"; empty for the left.
+    pub side: Name,
+    /// How far from the wall the middle of the robot is to be (m); zero for the action's own.
+    pub distance: f64,
+    /// The highest speed (m/s); zero for the robot's own.
+    pub speed: f64,
+    /// For how long (s); zero for as long as the navigation module gives by itself.
+    pub seconds: f64,
+}
+
 /// A wish that the robot ends what it does, as people and programs ask for it.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Message)]
 #[repr(C)]
@@ -81,6 +95,17 @@ pub enum Motion {
     Path = 5,
     /// To come to a pose to a centimetre.
     Dock = 6,
+    /// To turn to a place, to drive straight to it by the wheels alone, and to turn to a heading.
+    To = 7,
+    /// To follow a wall for a time.
+    Wall = 8,
+}
+
+impl Motion {
+    /// Whether it has a place where it ends, so that it can be begun anew from elsewhere.
+    pub const fn has_place(self) -> bool {
+        matches!(self, Motion::Goto | Motion::Path | Motion::Dock | Motion::To)
+    }
 }
 
 /// What the robot does until the next task. Actions act on the newest.
@@ -103,11 +128,13 @@ pub struct Task {
     pub linear: f64,
     /// Turn rate (rad/s): what a velocity has, and what everything else has at most; zero for the action's own.
     pub angular: f64,
-    /// How far (m).
+    /// How far to drive, or to keep from a wall (m).
     pub distance: f64,
     /// How far to turn (rad).
     pub angle: f64,
-    /// How long: what a velocity takes, and what everything else may take (s); zero for no end.
+    /// Whether a wall is on the left.
+    pub left: bool,
+    /// How long: what a velocity and following a wall take, and what everything else may take (s); zero for no end.
     pub seconds: f64,
 }
 
