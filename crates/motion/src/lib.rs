@@ -24,7 +24,6 @@
 //! | [`ring`] | ranges around the robot, of a few sonars or of a laser |
 //! | [`safety`] | how fast is still safe, and where there is room |
 //! | [`stopping`] | when to stop softly, how, and until when |
-//! | [`stop`] | how speed falls in a hard stop and in a soft one |
 //! | [`wall`] | steering along a wall |
 //! | [`boundary`] | which ways a body fits through, and which of them is along the wall |
 //! | [`pursuit`] | following what a camera on a turning head sees |
@@ -51,7 +50,6 @@ pub mod pursuit;
 pub mod ring;
 pub mod safety;
 pub mod steering;
-pub mod stop;
 pub mod stopping;
 pub mod track;
 pub mod trajectory;
