@@ -3,8 +3,8 @@
 //! | shape | keys |
 //! |---|---|
 //! | `ls` | `system`, `time_s`, `agents`: rows of `name`, `kind`, `state` (`running`, `restarting`, `dead`), `executor`, `asked`, `granted`, `period_s` (null without one), `deadline_s`, the counts, `last_death` (null when it never died), `params`; `queues` |
-//! | `graph` | `system`, `time_s`, `agents`: rows of `name`, `kind`, `doc`, `executor`, `ports`: rows of `name`, `doc`, `direction` (`input`, `output`, `service`, `client`, `router`, `manager`), `message`, `sent`, of a reading `processing` (`raw`, `filtered`, `interpreted`), where it is `router` `asked`, `not_asked`; `wires`: rows of `from`, `to`, `message`, `depth`, `overload`, `filter`, `sent`, `taken`, `dropped`, `refused`, `expired`; `queues` |
-//! | `top` | `system`, `time_s`, `messages`: `sent`, `taken`, `dropped`, `refused`, `expired` over all wires; `agents`: rows of `name`, `state`, `executor`, `asked`, `granted`, the counts, and the figures `exec`, `jitter`, `response` |
+//! | `graph` | `system`, `time_s`, `agents`: rows of `name`, `kind`, `doc`, `executor`, `ports`: rows of `name`, `doc`, `direction` (`input`, `output`, `service`, `client`, `router`, `manager`), `message`, `sent`, of a reading `processing` (`raw`, `filtered`, `interpreted`), where it is `router` `asked`, `not_asked`; `wires`: rows of `from`, `to`, `message`, `depth`, `overload`, `filter`, `sent`, `taken`, `replaced` (displaced by newer ones before an input that only ever asks for the newest), `dropped`, `refused`, `expired`; `queues` |
+//! | `top` | `system`, `time_s`, `messages`: `sent`, `taken`, `replaced`, `dropped`, `refused`, `expired` over all wires; `agents`: rows of `name`, `state`, `executor`, `asked`, `granted`, the counts, and the figures `exec`, `jitter`, `response` |
 //! | counts | `releases`, `missed`, `stalled`, `skipped`, `faults`, `panics`, `hangs`, `restarts`, `refinements`, `overruns` (of the budget for refinements); how it does its step at the moment: `method` and `budget_s` (null without), `suspended`; of execution times `left_out` (a stall was in the step), `checked` (held against the clock of the thread) and `disagreed`; `allocations` (how often steps took or freed memory, where the program watches that) |
 //! | figure | `name`, `unit`, `n`, `min`, `p50`, `p99`, `p999`, `max`: unfiltered; all values null while `n` is 0 |
 //! | `queues` | rows of `name`, `message` (null before anybody is wired to it), `depth`, `overload`, `waiting`, `sent`, `dropped`, `refused`, `taken`, `receivers`: rows of `to`, `serving`, `taken`; what was sent and taken on wires that are gone counts too |
@@ -47,8 +47,8 @@ pub fn graph(view: &SystemView) -> Json {
 pub fn top(view: &SystemView) -> Json {
     let sum = |of: fn(&WireView) -> u64| view.wires.iter().map(of).sum::<u64>();
     let messages = json!({
-        "sent": sum(|wire| wire.sent), "taken": sum(|wire| wire.taken), "dropped": sum(|wire| wire.dropped),
-        "refused": sum(|wire| wire.refused), "expired": sum(|wire| wire.expired),
+        "sent": sum(|wire| wire.sent), "taken": sum(|wire| wire.taken), "replaced": sum(|wire| wire.replaced),
+        "dropped": sum(|wire| wire.dropped), "refused": sum(|wire| wire.refused), "expired": sum(|wire| wire.expired),
     });
     system(view, view.agents.iter().map(top_agent).collect(), [("messages", messages)])
 }
@@ -162,7 +162,8 @@ fn graph_wire(wire: &WireView) -> Json {
     json!({
         "from": wire.from, "to": wire.to, "message": wire.message, "depth": wire.depth,
         "overload": wire.overload.name(), "filter": filter(&wire.filter), "sent": wire.sent,
-        "taken": wire.taken, "dropped": wire.dropped, "refused": wire.refused, "expired": wire.expired,
+        "taken": wire.taken, "replaced": wire.replaced, "dropped": wire.dropped, "refused": wire.refused,
+        "expired": wire.expired,
     })
 }
 

@@ -25,7 +25,6 @@
 //! | [`safety`] | how fast is still safe, and where there is room |
 //! | [`stopping`] | when to stop softly, how, and until when |
 //! | [`passive`] | how fast, so that whoever walks into it finds it standing |
-//! | [`stop`] | how speed falls in a hard stop and in a soft one |
 //! | [`wall`] | steering along a wall |
 //! | [`boundary`] | which ways a body fits through, and which of them is along the wall |
 //! | [`pursuit`] | following what a camera on a turning head sees |
@@ -53,7 +52,6 @@ pub mod pursuit;
 pub mod ring;
 pub mod safety;
 pub mod steering;
-pub mod stop;
 pub mod stopping;
 pub mod track;
 pub mod trajectory;

@@ -18,10 +18,17 @@
 //! R meets a point at polar coordinates (ρ, θ) about that centre after the angle θ − acos((r² + ρ² − R²) / 2 r ρ). What is not seen, or
 //! was seen too long ago, is no free way: a stale sensor is an obstacle.
 //!
-//! It is a stop of category 1 or 2 in the words of IEC 60204-1, 9.2.2: a controlled stop, after which the drive keeps its power. The hard
-//! stop (a contact, a person, a referee) is no law but a latch in front of the driver, and its braking is the board's.
+//! It is one of two stops. The other is no law but a latch in front of the driver:
+//!
+//! | kind | asked for by | order | category of IEC 60204-1, 9.2.2 | ends |
+//! |---|---|---|---|---|
+//! | soft | something within the critical range | a ramp | 2: controlled, the drive keeps its power | by itself, when the way is clear |
+//! | hard | a contact, a person, a referee, a fault | zero, at once: the board brakes as hard as it can | 1, or 0 where hardware cuts the power | by a reset, which moves nothing |
+//!
+//! Software alone is never category 0. ISO 13850 wants an emergency stop to be category 0 or 1, to come before everything and to latch.
 
 use crate::kinematics::Twist;
+use crate::safety::stopping_distance;
 use libm::{acos, atan2, fabs, fmax, fmin, hypot, sqrt};
 use types::geometry::TAU;
 
@@ -64,8 +71,7 @@ impl Default for Parameters {
 
 /// The critical range at a speed (m/s), from the rim (m).
 pub fn critical_range(parameters: &Parameters, speed: f64) -> f64 {
-    let speed = fabs(speed);
-    speed * parameters.reaction + speed * speed / (2.0 * parameters.deceleration) + parameters.margin
+    stopping_distance(fabs(speed), parameters.reaction, parameters.deceleration) + parameters.margin
 }
 
 /// The way that a body moving by `twist` has before it meets a point (m), seen from the middle of the body; infinite where it passes it.

@@ -100,8 +100,8 @@ const BENCHES: &[Bench] = &[
     },
     Bench {
         name: "nav",
-        what: "steps of the laws of avoidance on a scan of 360 beams, beside a copy of the scan",
-        goal: "30 us a step; told beside it nearness/memcpy, smooth/memcpy",
+        what: "steps of the laws of avoidance on a scan of 360 beams, and of the filter of the pose, beside a copy of the scan",
+        goal: "30 us a step of avoidance, 5 us one of the filter; told beside it nearness/memcpy, smooth/memcpy, ekf/memcpy",
         measure: nav::measure,
     },
     Bench {

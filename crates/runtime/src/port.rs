@@ -32,14 +32,18 @@ pub struct WireId(pub u32);
 pub struct WireCounts {
     /// Put into the ring.
     pub sent: AtomicU64,
-    /// Displaced by newer ones, or dropped because older ones stayed.
+    /// Displaced by newer ones.
+    pub displaced: AtomicU64,
+    /// Dropped because older ones stayed.
     pub dropped: AtomicU64,
     /// Given back to the sender.
     pub refused: AtomicU64,
     /// The two sides are often on two processors, and would take a line of memory from one another.
-    _apart: [u64; 5],
-    /// Taken by the receiver.
+    _apart: [u64; 4],
+    /// Taken one by one by the receiver.
     pub taken: AtomicU64,
+    /// Taken by a receiver that asked for the newest, those among them that it passed over.
+    pub newest: AtomicU64,
     /// Links whose message had left the memory before it was read.
     pub expired: AtomicU64,
 }

@@ -379,7 +379,9 @@ pub struct WireView {
     pub filter: WireFilter,
     /// Messages put into it.
     pub sent: u64,
-    /// Messages that were displaced or dropped.
+    /// Messages that newer ones displaced before a receiver that only ever asks for the newest.
+    pub replaced: u64,
+    /// Messages that were displaced or dropped, and that the receiver would have taken.
     pub dropped: u64,
     /// Messages that were given back.
     pub refused: u64,
@@ -394,7 +396,9 @@ pub struct WireView {
 pub struct WireTotals {
     /// Messages put into them.
     pub sent: u64,
-    /// Messages that were displaced or dropped, or lay in a wire that was cut and were never taken.
+    /// Messages that newer ones displaced before a receiver that only ever asks for the newest: it would have passed over them.
+    pub replaced: u64,
+    /// Messages that were displaced or dropped otherwise, or lay in a wire that was cut and were never taken.
     pub dropped: u64,
     /// Messages that were given back.
     pub refused: u64,
@@ -406,19 +410,34 @@ pub struct WireTotals {
 
 impl WireTotals {
     pub(crate) fn of(counts: &WireCounts) -> WireTotals {
+        let [displaced, dropped, one_by_one, newest] =
+            [&counts.displaced, &counts.dropped, &counts.taken, &counts.newest]
+                .map(|count| count.load(Relaxed));
+        // Whoever takes one message after the other misses each that is displaced, and of who takes none nobody knows.
+        let (replaced, lost) = if one_by_one == 0 && newest > 0 { (displaced, 0) } else { (0, displaced) };
         WireTotals {
             sent: counts.sent.load(Relaxed),
-            dropped: counts.dropped.load(Relaxed),
+            replaced,
+            dropped: dropped + lost,
             refused: counts.refused.load(Relaxed),
-            taken: counts.taken.load(Relaxed),
+            taken: one_by_one + newest,
             expired: counts.expired.load(Relaxed),
         }
+    }
+
+    /// What went over a ring that is no more. What was in it still is lost.
+    pub(crate) fn at_the_end(counts: &WireCounts) -> WireTotals {
+        let mut totals = WireTotals::of(counts);
+        let gone = totals.taken + totals.expired + counts.displaced.load(Relaxed);
+        totals.dropped += totals.sent.saturating_sub(gone);
+        totals
     }
 }
 
 impl core::ops::AddAssign for WireTotals {
     fn add_assign(&mut self, more: WireTotals) {
         self.sent += more.sent;
+        self.replaced += more.replaced;
         self.dropped += more.dropped;
         self.refused += more.refused;
         self.taken += more.taken;

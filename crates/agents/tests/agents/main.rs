@@ -4,4 +4,5 @@
 
 mod deciding;
 mod localizing;
+mod reacting;
 mod seeing;

@@ -1,4 +1,5 @@
-//! What a step of navigation takes, beside a copy of the scan that it works on.
+//! What a step of navigation takes, beside a copy of a scan: the laws of avoidance on that very scan, and the filter that believes where
+//! the robot is on a step of the wheels and a landmark.
 
 use std::hint::black_box;
 
@@ -8,6 +9,7 @@ use types::geometry::TAU;
 use types::{Point, Pose};
 
 use super::Setting;
+use super::localize;
 use super::outcome::{Measured, Outcome};
 use super::turns::mean;
 use crate::error::Failure;
@@ -31,6 +33,8 @@ pub(super) fn measure(setting: &Setting<'_>) -> Result<Outcome, Failure> {
     let scans: Vec<[f32; BEAMS]> = (0..SCANS).map(scan).collect();
     let (rounds, steps) = (setting.of(ROUNDS, 1), setting.of(STEPS, 200));
     let mut works = avoidance();
+    let mut believe = localize::step_of_filter();
+    works.push(("ekf/memcpy", "ekf", Box::new(move |_| believe())));
     for (name, figure, work) in &mut works {
         let (mut ours, mut ratios) = (Vec::new(), Vec::new());
         for _ in 0..rounds {

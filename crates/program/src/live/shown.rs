@@ -104,9 +104,12 @@ pub(super) fn graph(answer: &Json) -> String {
                 text(&wire["message"]),
                 text(&wire["sent"])
             );
-            for (key, word) in
-                [("dropped", "dropped"), ("refused", "given back"), ("expired", "read too late")]
-            {
+            for (key, word) in [
+                ("replaced", "replaced by newer ones"),
+                ("dropped", "dropped"),
+                ("refused", "given back"),
+                ("expired", "read too late"),
+            ] {
                 if wire[key].as_u64().is_some_and(|count| count > 0) {
                     let _ = write!(line, ", {} {word}", wire[key]);
                 }
@@ -188,10 +191,11 @@ pub(super) fn top(answer: &Json) -> String {
     }));
     let messages = &answer["messages"];
     format!(
-        "{} at {:.2} s: {} messages sent, {} dropped, {} given back\n{}",
+        "{} at {:.2} s: {} messages sent, {} replaced by newer ones, {} dropped, {} given back\n{}",
         text(&answer["system"]),
         answer["time_s"].as_f64().unwrap_or(0.0),
         text(&messages["sent"]),
+        text(&messages["replaced"]),
         text(&messages["dropped"]),
         text(&messages["refused"]),
         table(&lines, 3)

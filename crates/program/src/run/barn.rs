@@ -3,8 +3,8 @@
 use std::collections::BTreeMap;
 use std::path::Path;
 use std::process::ExitCode;
-use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
-use std::sync::{Arc, Mutex, PoisonError};
+use std::sync::Arc;
+use std::sync::atomic::AtomicBool;
 
 use record::figure::{Drawing, Panel, Sheet};
 use serde_json::{Value as Json, json};
@@ -15,7 +15,7 @@ use types::{Point, Time};
 use super::judge::{Facts, What};
 use super::prepare::Scenario;
 use super::summary::{Summary, table};
-use super::{One, Place, options};
+use super::{One, Place, many, options};
 use crate::cli::{RunArgs, Seeds, Shaped};
 use crate::error::{Failure, Place as At, Problem};
 use crate::{figures, terminal};
@@ -101,7 +101,9 @@ pub(super) fn run(
             .help("--seeds 7..7 runs the world 7 alone"));
     }
     let begun = terminal::host_now();
-    let done = all(args, scenario, &worlds, asked_to_end)?;
+    let is_alone = worlds.len() == 1;
+    let run = |place: usize| one(args, scenario, &worlds[place], is_alone, asked_to_end);
+    let done = many::each("worlds", worlds.len(), asked_to_end, run)?;
     let took = begun.elapsed().as_secs_f64();
     let total = Total::of(&worlds, &done);
     let robot = args.robot.unwrap_or_default();
@@ -151,52 +153,6 @@ fn wrong(path: &Path, text: &str, error: &barn::NotWorlds) -> Failure {
     let place = At { file, line: error.line, column: 1, text: start, width };
     let problem = Problem { what: error.what.clone(), help: Some(form.into()), place: Some(place) };
     Failure { problems: vec![problem], code: 2 }
-}
-
-/// What became of each world, by its place among them; those that were not begun when somebody interrupted are missing.
-fn all(
-    args: &RunArgs,
-    scenario: &Scenario,
-    worlds: &[World],
-    asked_to_end: &Arc<AtomicBool>,
-) -> Result<BTreeMap<usize, Outcome>, Failure> {
-    let cores = std::thread::available_parallelism().map_or(1, usize::from).min(worlds.len());
-    let next = AtomicUsize::new(0);
-    let done = Mutex::new(BTreeMap::new());
-    let failed = Mutex::new(None);
-    let bar = terminal::progress(worlds.len() as u64, "worlds");
-    std::thread::scope(|scope| {
-        for core in 0..cores {
-            let work = || {
-                while !asked_to_end.load(Ordering::Relaxed) {
-                    let i = next.fetch_add(1, Ordering::Relaxed);
-                    let Some(world) = worlds.get(i) else { return };
-                    if failed.lock().unwrap_or_else(PoisonError::into_inner).is_some() {
-                        return;
-                    }
-                    match one(args, scenario, world, worlds.len() == 1, asked_to_end) {
-                        Ok(outcome) => {
-                            done.lock().unwrap_or_else(PoisonError::into_inner).insert(i, outcome);
-                            bar.inc(1);
-                        }
-                        Err(failure) => {
-                            *failed.lock().unwrap_or_else(PoisonError::into_inner) = Some(failure);
-                        }
-                    }
-                }
-            };
-            let thread = std::thread::Builder::new().name(format!("sinew-worlds-{core}"));
-            if thread.spawn_scoped(scope, work).is_err() && core == 0 {
-                let failure = Failure::new("no thread could be started for the runs").code(1);
-                *failed.lock().unwrap_or_else(PoisonError::into_inner) = Some(failure);
-            }
-        }
-    });
-    bar.finish_and_clear();
-    match failed.into_inner().unwrap_or_else(PoisonError::into_inner) {
-        Some(failure) => Err(failure),
-        None => Ok(done.into_inner().unwrap_or_else(PoisonError::into_inner)),
-    }
 }
 
 /// The run in a world, seeded by its number. One that is alone has a log.

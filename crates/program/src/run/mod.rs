@@ -14,6 +14,7 @@ mod burden;
 mod compare;
 mod judge;
 mod knowing;
+mod many;
 mod options;
 mod prepare;
 mod recorder;

@@ -2,15 +2,15 @@
 
 use std::collections::BTreeMap;
 use std::process::ExitCode;
-use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
-use std::sync::{Arc, Mutex, PoisonError};
+use std::sync::Arc;
+use std::sync::atomic::AtomicBool;
 
 use serde_json::{Value as Json, json};
 
 use super::knowing::Knowing;
 use super::prepare::Scenario;
 use super::summary::{Summary, seconds, table};
-use super::{One, Place, options};
+use super::{One, Place, many, options};
 use crate::cli::{RunArgs, Seeds};
 use crate::error::Failure;
 use crate::terminal;
@@ -30,7 +30,12 @@ pub(super) fn run(
     }
     let begun = terminal::host_now();
     let knowing = knowing.map(Knowing::still);
-    let done = all(args, scenario, knowing.as_ref(), range, asked_to_end)?;
+    let seed = |number: usize| range.first + number as u64;
+    let run = |number| one(args, scenario, knowing.as_ref(), seed(number), asked_to_end);
+    let count = (range.last - range.first + 1) as usize;
+    let done = many::each("runs", count, asked_to_end, run)?;
+    let done: BTreeMap<u64, Summary> =
+        done.into_iter().map(|(number, summary)| (seed(number), summary)).collect();
     let took = begun.elapsed().as_secs_f64();
     let met = done.values().filter(|summary| summary.is_success()).count();
     if json {
@@ -38,55 +43,7 @@ pub(super) fn run(
     } else {
         terminal::say(&text(&scenario.file.plan.name, range, &done, took));
     }
-    let all_met = met as u64 == range.last - range.first + 1;
-    Ok(if all_met { ExitCode::SUCCESS } else { ExitCode::FAILURE })
-}
-
-/// Each seed with its summary; those that were not begun when somebody interrupted are missing.
-fn all(
-    args: &RunArgs,
-    scenario: &Scenario,
-    knowing: Option<&Knowing>,
-    range: Seeds,
-    asked_to_end: &Arc<AtomicBool>,
-) -> Result<BTreeMap<u64, Summary>, Failure> {
-    let count = range.last - range.first + 1;
-    let cores = std::thread::available_parallelism().map_or(1, usize::from).min(count as usize);
-    let next = AtomicU64::new(range.first);
-    let done = Mutex::new(BTreeMap::new());
-    let failed = Mutex::new(None);
-    let bar = terminal::progress(count, "runs");
-    std::thread::scope(|scope| {
-        for core in 0..cores {
-            let work = || {
-                while !asked_to_end.load(Ordering::Relaxed) {
-                    let seed = next.fetch_add(1, Ordering::Relaxed);
-                    if seed > range.last || failed.lock().unwrap_or_else(PoisonError::into_inner).is_some() {
-                        return;
-                    }
-                    match one(args, scenario, knowing, seed, asked_to_end) {
-                        Ok(summary) => {
-                            done.lock().unwrap_or_else(PoisonError::into_inner).insert(seed, summary);
-                            bar.inc(1);
-                        }
-                        Err(failure) => {
-                            *failed.lock().unwrap_or_else(PoisonError::into_inner) = Some(failure);
-                        }
-                    }
-                }
-            };
-            let thread = std::thread::Builder::new().name(format!("sinew-seeds-{core}"));
-            if thread.spawn_scoped(scope, work).is_err() && core == 0 {
-                let failure = Failure::new("no thread could be started for the runs").code(1);
-                *failed.lock().unwrap_or_else(PoisonError::into_inner) = Some(failure);
-            }
-        }
-    });
-    bar.finish_and_clear();
-    match failed.into_inner().unwrap_or_else(PoisonError::into_inner) {
-        Some(failure) => Err(failure),
-        None => Ok(done.into_inner().unwrap_or_else(PoisonError::into_inner)),
-    }
+    Ok(if met == count { ExitCode::SUCCESS } else { ExitCode::FAILURE })
 }
 
 fn one(

@@ -302,7 +302,7 @@ impl<T: Message> Input<T> {
         while let Some(lane) = inner.next() {
             inner.note_taken();
             inner.last = Some(lane);
-            count(&inner.lanes[lane].counts.taken);
+            count(&inner.lanes[lane].counts.newest);
         }
         let lane = inner.last.take()?;
         inner.lanes[lane].read()

@@ -148,7 +148,7 @@ impl<T: Message> Route<T> {
     pub(super) fn account(&mut self, pushed: Pushed, mut sent: Sent, context: Option<&Context>) -> Sent {
         match pushed {
             Pushed::Stored => {}
-            Pushed::Displaced => count(&self.counts.dropped),
+            Pushed::Displaced => count(&self.counts.displaced),
             Pushed::Full if self.overload == Overload::Refuse => {
                 count(&self.counts.refused);
                 sent.refused += 1;

@@ -230,7 +230,6 @@ impl Router {
             end: input,
             ring: under_way.question,
             counts: under_way.asked.clone(),
-            overload: Overload::Refuse,
             into: Tally::Nowhere,
             until: self.now,
         };

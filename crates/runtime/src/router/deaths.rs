@@ -8,9 +8,8 @@ use super::{Fabric, Incident, Known, Reply, Rings, Router, Wire};
 use crate::agent::Body;
 use crate::executor::{Cause, RawCause};
 use crate::plan::OnDeath;
-use crate::port::{OutputFault, WireCounts, WireId};
+use crate::port::{OutputFault, WireId};
 use crate::request::{AgentState, Refusal, WireTotals};
-use crate::ring::Overload;
 
 /// Restart waits this long after the first death, and twice as long after each that follows.
 const FIRST_PAUSE: Duration = Duration::millis(100);
@@ -159,7 +158,7 @@ impl Router {
                     // Else it keeps its place in the memory of the sender.
                     self.of_mut(old.from.0, |known| known.routed(old.from.1, -1));
                 }
-                wire.past += totals(&old.counts, old.overload);
+                wire.past += WireTotals::at_the_end(&old.counts);
             } else if let Some((executor, mut cut)) =
                 self.cut_of(&old, Tally::Wire(old.id, WireTotals::default()), self.now)
             {
@@ -224,12 +223,4 @@ fn built(known: &mut Known) -> Reply<Box<dyn Body>> {
         Some(body) => Ok(body),
         None => known.kind.build(&known.params).map_err(super::first),
     }
-}
-
-/// What went over a ring that is no more. What was in it still is lost.
-pub(super) fn totals(counts: &WireCounts, overload: Overload) -> WireTotals {
-    let mut totals = WireTotals::of(counts);
-    let displaced = if overload == Overload::NewestWins { totals.dropped } else { 0 };
-    totals.dropped += totals.sent.saturating_sub(totals.taken + totals.expired + displaced);
-    totals
 }

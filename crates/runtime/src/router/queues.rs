@@ -714,7 +714,7 @@ impl Router {
     fn view_queue_wire(&self, found: Found) -> WireView {
         let (at, side, place) = found;
         let queue = &self.queues[at];
-        let WireTotals { sent, dropped, refused, taken, expired } = match side {
+        let WireTotals { sent, replaced, dropped, refused, taken, expired } = match side {
             QueueSide::Into => queue.senders[place].counted.totals(),
             QueueSide::OutOf => queue.receivers[place].counted.totals(),
         };
@@ -727,6 +727,7 @@ impl Router {
             overload: queue.plan.overload(),
             filter: plan.filter,
             sent,
+            replaced,
             dropped,
             refused,
             taken,

@@ -18,12 +18,10 @@ use std::sync::Arc;
 
 use types::{AgentId, Duration, Time};
 
-use super::deaths::totals;
 use super::{Fabric, Incident, PortId, Reply, Router};
 use crate::executor::{Answer, Change};
 use crate::port::{InputEnd, WireCounts, WireId};
 use crate::request::{AgentState, Refusal, WireTotals};
-use crate::ring::Overload;
 
 /// How long a receiver may take for what is on a wire that is cut, on the clock of the system. Then it is lost, and counted.
 pub(super) const DRAINS_WITHIN: Duration = Duration::secs(5);
@@ -51,7 +49,6 @@ pub(super) struct Cut {
     pub end: Arc<dyn InputEnd>,
     pub ring: WireId,
     pub counts: Arc<WireCounts>,
-    pub overload: Overload,
     pub into: Tally,
     /// Until when it is waited for.
     pub until: Time,
@@ -377,7 +374,7 @@ impl Router {
     /// What went over a ring that is no more. What was in it still is lost.
     pub(super) fn tally(&mut self, cut: &Cut) {
         let Tally::Wire(wire, before) = cut.into else { return };
-        let totals = totals(&cut.counts, cut.overload);
+        let totals = WireTotals::at_the_end(&cut.counts);
         match self.wires.get_mut(&wire) {
             Some(wire) => wire.past += totals,
             None => {

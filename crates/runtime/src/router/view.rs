@@ -112,6 +112,7 @@ impl Router {
             overload: wire.overload,
             filter: plan.filter,
             sent: totals.sent,
+            replaced: totals.replaced,
             dropped: totals.dropped,
             refused: totals.refused,
             taken: totals.taken,

@@ -255,9 +255,9 @@ impl Router {
     pub(super) fn cut_of(&self, wire: &Wire, into: Tally, until: Time) -> Option<(usize, Cut)> {
         let receiver = self.by_id(wire.to.0)?;
         let end = receiver.ends[wire.to.1].input.clone()?;
-        let Wire { from, to, ring, overload, .. } = *wire;
+        let Wire { from, to, ring, .. } = *wire;
         let counts = wire.counts.clone();
-        let cut = Cut { slot: receiver.slot, to, from, end, ring, counts, overload, into, until };
+        let cut = Cut { slot: receiver.slot, to, from, end, ring, counts, into, until };
         Some((receiver.executor, cut))
     }
 }

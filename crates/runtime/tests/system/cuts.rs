@@ -1,7 +1,10 @@
 //! What is on a wire when it is cut.
 
-use runtime::{Options, Overload, Plan, Report, Simulation, WirePlan, WireTotals};
+use runtime::{
+    Agent, Fault, Input, Options, Overload, Plan, Report, Simulation, Step, WirePlan, WireTotals, registry,
+};
 use types::Duration;
+use types::messages::Twist;
 
 use crate::{Sink, Source, SourceParams, at, heard, options, sink, types};
 
@@ -52,4 +55,44 @@ fn what_nobody_took_is_counted_as_dropped() {
 
     let (heard, removed) = run("cut-removed", &[(505, "remove sink")], 600);
     assert_eq!((heard.len(), removed.view.past), (1, lost), "a mailbox goes with its agent");
+}
+
+/// Asks for the newest alone.
+#[derive(Agent)]
+struct Gauge {
+    /// What comes.
+    count: Input<Twist>,
+}
+
+impl Agent for Gauge {
+    fn step(&mut self, _: &mut Step) -> Result<(), Fault> {
+        self.count.latest();
+        Ok(())
+    }
+}
+
+#[test]
+fn what_a_newer_one_displaced_is_replaced_for_who_asks_for_the_newest_and_dropped_for_others() {
+    let mut plan = Plan::new("replaced");
+    plan.add::<Source>("source", SourceParams { by: 1.0 });
+    plan.add::<Gauge>("gauge", Default::default());
+    plan.add::<Sink>("sink", sink("replaced"));
+    plan.every("source", Duration::millis(10));
+    for name in ["gauge", "sink"] {
+        plan.every(name, Duration::millis(100));
+        plan.wires.push(WirePlan::new("source.out", format!("{name}.count")));
+    }
+    let types = registry![Source, Sink, Gauge];
+    let report = Simulation::new(&plan, &types, options(1000)).unwrap().run().unwrap();
+    let counts = report.view.wires.iter().map(|wire| (wire.sent, wire.taken, wire.replaced, wire.dropped));
+    // One at once, then ten looks, each at the last four of ten.
+    assert_eq!(counts.collect::<Vec<_>>(), [(101, 41, 60, 0), (101, 41, 0, 60)]);
+
+    // Of those that came after its first look the last four lay there when the wire was cut, and were never passed over.
+    plan.agent_mut("gauge").unwrap().period = Some(Duration::secs(60));
+    plan.requests = vec![at(505, "unwire source.out gauge.count")];
+    plan.wires.truncate(1);
+    let report = Simulation::new(&plan, &types, options(6000)).unwrap().run().unwrap();
+    let past = WireTotals { sent: 51, taken: 1, replaced: 46, dropped: 4, ..WireTotals::default() };
+    assert_eq!(report.view.past, past);
 }

@@ -80,7 +80,7 @@ pub(super) fn run(
         sent: outputs.iter().map(|(_, sent)| sent).sum(),
         found: outputs.iter().filter_map(|(topic, _)| found(topic)).map(|topic| topic.messages).sum(),
         lost: report.log_dropped
-            + report.view.wires.iter().map(|wire| wire.dropped + wire.refused).sum::<u64>(),
+            + report.view.wires.iter().map(|wire| wire.replaced + wire.dropped + wire.refused).sum::<u64>(),
         size: std::fs::metadata(&scratch.0).map_or(0, |data| data.len()),
     })
 }

@@ -55,7 +55,8 @@ pub(super) fn figure(floor: &Floor, query: Query) -> Potential {
         while field.refine() != Refined::Final {
             refinements += 1;
         }
-        panels.push(panel(&floor.grid, &field, &format!("after {refinements} refinements")));
+        let s = if refinements == 1 { "" } else { "s" };
+        panels.push(panel(&floor.grid, &field, &format!("after {refinements} refinement{s}")));
     }
     Potential { panels, unit: "way to the goal (sides of a cell)".into() }
 }
