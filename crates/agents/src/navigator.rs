@@ -7,8 +7,8 @@ use navigation::avoid::Body;
 use navigation::navigator::{Navigator as Stack, Parameters, Scan};
 use runtime::{Agent, Fault, Input, Output, Step};
 use types::messages::{
-    Doing, Drive, LaserScan, Mode, Motion, Navigation, Odometry, Offer, Path as Way, Progress, Report, Task,
-    Twist, WAYPOINTS,
+    Doing, Drive, EmergencyStop, LaserScan, Mode, Motion, Navigation, Odometry, Offer, Path as Way, Progress,
+    Report, Task, Twist, WAYPOINTS,
 };
 use types::params::Params;
 use types::{Duration, Point, Pose, Time};
@@ -61,6 +61,12 @@ pub struct NavigatorParams {
     /// Without a scan for so long it stands (time). 300 ms is three missed ones at 10 Hz.
     #[param(default = Duration::millis(300), min = 0.02, max = 10.0)]
     pub stale: Duration,
+    /// How long it keeps in mind what its laser cannot see now (time). An hour: things stay. People walk on, so among them some seconds are enough.
+    #[param(default = Duration::secs(3600), min = 0.1, max = 86400.0)]
+    pub remember: Duration,
+    /// How long it waits while a stop holds it back before it counts as stuck (time). A minute: people who stand and talk go on at some time.
+    #[param(default = Duration::secs(60), min = 0.0, max = 3600.0)]
+    pub wait: Duration,
     /// How much its wish matters to it, from 0 to 1. 1: it is made for nothing else.
     #[param(default = 1.0, min = 0.0, max = 1.0)]
     pub weight: f64,
@@ -89,6 +95,7 @@ impl NavigatorParams {
             latency: self.latency,
             goal_tolerance: self.goal_tolerance,
             stale: self.stale.seconds(),
+            remember: self.remember.seconds(),
             ..Parameters::new(self.body(), self.linear_max)
         }
     }
@@ -114,6 +121,8 @@ pub struct Navigator {
     task: Input<Task>,
     /// Where the robot is on the map, from the localizer: for tasks whose goal is there.
     pose: Input<Odometry>,
+    /// What a stop allows: while that holds it back it waits, and is not stuck.
+    stop: Input<EmergencyStop>,
     /// A wish to drive, for a coordinator.
     drive: Output<Offer>,
     /// How far it has come with its task.
@@ -173,6 +182,9 @@ impl Agent for Navigator {
             let at = self.odometry.at(stamp).map(|found| found.value().pose);
             self.helm.look(&scan, scan.row(), at, stamp);
         }
+        if let Some(stop) = self.stop.latest() {
+            self.helm.hear(&self.params, stop.allowed, step.now);
+        }
         let state = self.helm.step(&self.params, step.now);
         let (twist, now) = (state.twist, step.now);
         if is_action {
@@ -209,6 +221,8 @@ fn told(task: &Task, state: &Navigation, seconds: f64) -> Report {
 
 /// A goal that a correction of the localizer moves by less than this stays where it is (m): another one is begun anew.
 const MOVED: f64 = 0.1;
+/// Allowed less than this a robot is held back (m/s): hardly more than one that counts as stuck comes along.
+const HELD: f64 = 0.15;
 
 /// The stack, and what it was told last.
 #[derive(Debug, Default)]
@@ -219,6 +233,8 @@ struct Helm {
     heard: Option<Option<Point>>,
     /// The goal before this step.
     goal: Option<Point>,
+    /// Since when a stop holds it back.
+    held: Option<Time>,
 }
 
 impl Helm {
@@ -230,6 +246,14 @@ impl Helm {
             return;
         }
         self.heard = Some(goal);
+    }
+
+    /// Hears what speed a stop allows (m/s).
+    fn hear(&mut self, params: &NavigatorParams, allowed: f64, now: Time) {
+        self.held = if allowed < HELD { self.held.or(Some(now)) } else { None };
+        if let Some(stack) = &mut self.stack {
+            stack.wait(self.held.is_some_and(|since| now - since <= params.wait));
+        }
     }
 
     /// Takes in a scan that was made at `at`; without it the last pose that was heard counts.
@@ -352,6 +376,23 @@ mod tests {
         assert_eq!(helm.step(&params(), at(0.2)).doing, Doing::Pursuing);
         let old = helm.step(&params(), at(0.4));
         assert_eq!((old.doing, old.twist), (Doing::Blind, Twist::ZERO));
+    }
+
+    #[test]
+    fn while_a_stop_holds_it_back_it_waits_for_a_while_and_then_tries_to_get_out() {
+        // It is told to stand, and does; a scan comes ten times a second.
+        let gets_out = |allowed: f64| {
+            let mut helm = helm();
+            (0..900).find(|tenth| {
+                let now = at(f64::from(*tenth) / 10.0);
+                helm.look(&scan(), &[8.0; 181], None, now);
+                helm.hear(&params(), allowed, now);
+                helm.step(&params(), now).doing == Doing::Escaping
+            })
+        };
+        // Two seconds of no progress are stuck; 60 s are waited before those.
+        assert!(gets_out(f64::INFINITY).is_some_and(|tenth| (20..25).contains(&tenth)));
+        assert!(gets_out(0.0).is_some_and(|tenth| (620..626).contains(&tenth)), "{:?}", gets_out(0.0));
     }
 
     #[test]

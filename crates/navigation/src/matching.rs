@@ -181,6 +181,19 @@ pub fn match_carefully(
     }
 }
 
+/// The share of a scan's beams that would have come through what the plan shows if it was taken at `pose`: that lie `slack` (m) and more behind the
+/// first thing in their way. People and things that the plan does not show make beams shorter, and only a wrong place makes them longer.
+pub fn came_through(floor: &impl Distances, scan: &Scan, pose: Pose, slack: f64) -> f64 {
+    let origin = pose.transform(scan.origin());
+    let came_through = |beam: &&Beam| {
+        let end = pose.transform(beam.end);
+        let way = origin.distance(end) - slack;
+        way > 0.0 && floor.cast(origin, (end - origin) * (1.0 / origin.distance(end)), way).is_some()
+    };
+    let many = scan.beams().iter().filter(came_through).count();
+    many as f64 / scan.beams().len().max(1) as f64
+}
+
 /// The normal equations of one round.
 #[derive(Clone, Copy, Debug, Default)]
 struct Normal {

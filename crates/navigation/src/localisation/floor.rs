@@ -38,7 +38,7 @@ use crate::floor::Distances;
 use crate::linear::{Matrix, deviations, diagonal};
 use crate::localisation::State;
 use crate::localisation::landmarks::{Believer, Effect, Errors, Filter, Parameters, Sight, Watch};
-use crate::matching::{Geometry, MatchParams, NoMatch, Scan, match_carefully};
+use crate::matching::{Geometry, MatchParams, NoMatch, Scan, came_through, match_carefully};
 use crate::monte_carlo::{Hypothesis, MOST_HYPOTHESES, MonteCarlo};
 use belief::Belief;
 use candidates::Candidates;
@@ -56,6 +56,8 @@ pub enum Outcome {
     Stuck,
     /// Too little came back: dead reckoning goes on.
     Empty,
+    /// Something hides what the plan shows, and nothing speaks against where the robot should be: dead reckoning goes on.
+    Hidden,
     /// It does not fit where the robot should be.
     Misfit,
 }
@@ -73,6 +75,8 @@ pub struct FloorLocalizer<F> {
     /// The digest of the last scan, and where the wheels said that it was first seen.
     last: Option<(u64, Pose)>,
     misses: u32,
+    /// Scans in a row that were hidden.
+    hidden: u32,
     /// Whether the last scan that was not a repetition fits.
     is_fixed: bool,
     /// Whether a scan has confirmed what somebody said.
@@ -98,6 +102,7 @@ impl<F: Distances> FloorLocalizer<F> {
             scan: Scan::new(),
             last: None,
             misses: 0,
+            hidden: 0,
             is_fixed: false,
             is_confirmed: false,
             inliers: 0.0,
@@ -249,15 +254,31 @@ impl<F: Distances> FloorLocalizer<F> {
         let found = match found {
             Ok(found) => found,
             Err(NoMatch::FewReturns) => return Outcome::Empty,
-            Err(NoMatch::NothingNear) => return self.miss(Outcome::Misfit),
+            Err(NoMatch::NothingNear) => return self.misfit(),
         };
         self.inliers = found.inliers;
         let least = if self.is_confirmed { self.params.inliers_least } else { self.params.inliers_sure };
         if found.inliers < least || !self.belief.correct(found.pose, &found.information, self.params.gate) {
-            return self.miss(Outcome::Misfit);
+            return self.misfit();
         }
-        (self.misses, self.is_confirmed) = (0, true);
+        (self.misses, self.hidden, self.is_confirmed) = (0, 0, true);
         Outcome::Fixed
+    }
+
+    /// What does not fit: since something hides what the plan shows, or since the robot is not where it should be.
+    fn misfit(&mut self) -> Outcome {
+        let FloorParams { through_most, hidden_most, .. } = self.params;
+        // What the wheels may have missed is no contradiction.
+        let slack = SLACK + 2.0 * self.belief.deviations().0;
+        if self.is_confirmed
+            && self.hidden < hidden_most
+            && came_through(&self.floor, &self.scan, self.belief.pose, slack) <= through_most
+        {
+            self.hidden += 1;
+            self.is_fixed = false;
+            return Outcome::Hidden;
+        }
+        self.miss(Outcome::Misfit)
     }
 
     fn miss(&mut self, outcome: Outcome) -> Outcome {
@@ -280,7 +301,8 @@ impl<F: Distances> FloorLocalizer<F> {
             None => self.cloud.scatter(),
         }
         self.candidates.clear();
-        (self.state, self.searched, self.misses, self.inliers) = (State::Searching, 0, 0, 0.0);
+        (self.state, self.searched, self.inliers) = (State::Searching, 0, 0.0);
+        (self.misses, self.hidden) = (0, 0);
         if let Some(hint) = hint {
             self.candidates.propose(&self.floor, &self.scan, hint, &self.params);
         }
@@ -356,6 +378,9 @@ fn digest(ranges: &[f32]) -> u64 {
         |hash: u64, range: &f32| (hash ^ u64::from(range.to_bits())).wrapping_mul(0x0000_0100_0000_01b3);
     ranges.iter().fold(0xcbf2_9ce4_8422_2325 ^ ranges.len() as u64, fold)
 }
+
+/// A beam that ends so much behind something has come through it (m): more than noise, and less than what a robot is pushed unnoticed.
+const SLACK: f64 = 0.2;
 
 /// What a scan says of a pose.
 type Fix = (Pose, Matrix);

@@ -37,6 +37,8 @@ pub struct Beam {
 #[derive(Clone, Debug)]
 pub struct Scan {
     beams: Vec<Beam>,
+    /// Where the laser is, in the frame of the body.
+    origin: Point,
 }
 
 impl Default for Scan {
@@ -48,7 +50,7 @@ impl Default for Scan {
 impl Scan {
     /// A scan of nothing.
     pub fn new() -> Scan {
-        Scan { beams: Vec::with_capacity(MOST_BEAMS) }
+        Scan { beams: Vec::with_capacity(MOST_BEAMS), origin: Point::default() }
     }
 
     /// Takes over the returns of a scan, every second, third … beam where there are more than `most` (at most 256). What is no number, too near
@@ -57,6 +59,7 @@ impl Scan {
         let most = most.clamp(1, MOST_BEAMS);
         let stride = ranges.len().div_ceil(most).max(1);
         let origin = geometry.mount.position();
+        self.origin = origin;
         self.beams.clear();
         // The ones chosen lie as far from the first beam as from the last.
         let first = (ranges.len().saturating_sub(1) % stride) / 2;
@@ -74,6 +77,11 @@ impl Scan {
     /// The beams that came back.
     pub fn beams(&self) -> &[Beam] {
         &self.beams
+    }
+
+    /// From where they went (m).
+    pub fn origin(&self) -> Point {
+        self.origin
     }
 
     /// Whether too few came back to tell anything.

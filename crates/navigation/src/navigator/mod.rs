@@ -70,6 +70,8 @@ pub struct Parameters {
     pub goal_tolerance: f64,
     /// Without a scan for so long it stands (s).
     pub stale: f64,
+    /// How long it keeps in mind what no beam touches (s).
+    pub remember: f64,
 }
 
 impl Parameters {
@@ -78,7 +80,7 @@ impl Parameters {
     /// 2 m/s² is what rubber wheels on a smooth floor give without slipping, to start, to brake and sideways half as much again; half a metre a second is as fast as it may go where it looks only by memory. 4 rad/s and
     /// 8 rad/s² turn a small robot. 0.1 s are a scan, a step and the lag of the motors. 3 cm around the body are the size of a cell and the
     /// noise of a laser, and four more for each metre a second what the wheels are late. 0.4 m/s are a slow walk, from which it stops in a hand's breadth.
-    /// 0.5 m beside it are plenty. Played for
+    /// 0.5 m beside it are plenty. Things stay where they are, so it remembers them for as long as they are near. Played for
     /// a second, then braked: farther ahead the way will be another one.
     pub fn new(body: Body, linear_max: f64) -> Parameters {
         Parameters {
@@ -98,6 +100,7 @@ impl Parameters {
             horizon: 1.0,
             goal_tolerance: 0.2,
             stale: 0.3,
+            remember: f64::INFINITY,
         }
     }
 }
@@ -127,6 +130,8 @@ pub struct Navigator {
     smooth: SmoothNearness,
     escape: Escape,
     seen: Option<f64>,
+    /// Whether somebody else makes it wait.
+    waits: bool,
 }
 
 impl Navigator {
@@ -155,6 +160,7 @@ impl Navigator {
             }),
             escape: Escape::new(escape::Parameters::default()),
             seen: None,
+            waits: false,
         }
     }
 
@@ -182,9 +188,17 @@ impl Navigator {
         self.seen = None;
     }
 
+    /// Whether somebody else holds the robot back from now on, as a stop in front of people does: who waits is not stuck.
+    pub fn wait(&mut self, waits: bool) {
+        self.waits = waits;
+    }
+
     /// Takes in a scan that was made at `pose` of the odometry.
     pub fn look(&mut self, scan: &Scan<'_>, pose: Pose) {
-        self.around.look(pose.then(scan.robot_from_sensor), scan.beams, scan.range_max);
+        let apart = self.seen.map_or(0.0, |before| scan.time - before);
+        let scans = self.parameters.remember / apart;
+        let keep = (apart > 0.0 && scans < f64::from(u16::MAX / 2)).then_some(scans as u16);
+        self.around.look(pose.then(scan.robot_from_sensor), scan.beams, scan.range_max, keep);
         self.sectors.clear();
         self.sectors.add_scan(scan.robot_from_sensor, scan.beams, scan.range_max);
         self.seen = Some(scan.time);
@@ -204,7 +218,7 @@ impl Navigator {
         self.track.set(self.route.points());
         let orders = self.orders(pose, present, goal);
         let room = Room { behind: self.behind(pose), wider: self.wider(pose) };
-        match self.escape.step(now, pose, orders.doing != Doing::Arrived, room) {
+        match self.escape.step(now, pose, orders.doing != Doing::Arrived && !self.waits, room) {
             None => orders,
             Some(_) if self.escape.phase() == Phase::GivenUp => stand(Doing::GivenUp),
             Some(twist) => self.checked(pose, present, twist),

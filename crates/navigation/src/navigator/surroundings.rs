@@ -68,8 +68,15 @@ impl Surroundings {
         self.placed = false;
     }
 
-    /// Takes in a scan from a laser at `world_from_sensor`; the square follows it. Ranges of `range_max` and more met nothing (m).
-    pub(super) fn look(&mut self, world_from_sensor: Pose, scan: Ring<'_>, range_max: f64) {
+    /// Takes in a scan from a laser at `world_from_sensor`; the square follows it. Ranges of `range_max` and more met nothing (m). What no beam
+    /// has touched for more than `keep` scans is forgotten.
+    pub(super) fn look(
+        &mut self,
+        world_from_sensor: Pose,
+        scan: Ring<'_>,
+        range_max: f64,
+        keep: Option<u16>,
+    ) {
         self.follow(world_from_sensor.position());
         self.scan = self.scan.wrapping_add(1);
         // What was hit in this scan is not freed by it: a beam that grazes a thing passes its cells.
@@ -79,6 +86,9 @@ impl Surroundings {
         for echo in scan.echoes() {
             let range = if echo.range < range_max { echo.range - 1.5 * CELL } else { FREED };
             self.free(world_from_sensor, echo.bearing, range.min(FREED));
+        }
+        if let Some(keep) = keep {
+            self.fade(keep);
         }
         self.measure();
     }
@@ -110,6 +120,14 @@ impl Surroundings {
             if self.weights[cell] > 0 && self.touched[cell] != self.scan {
                 self.weights[cell] -= 1;
                 self.touched[cell] = self.scan;
+            }
+        }
+    }
+
+    fn fade(&mut self, keep: u16) {
+        for (weight, touched) in self.weights.iter_mut().zip(&self.touched) {
+            if *weight > 0 && self.scan.wrapping_sub(*touched) > keep {
+                *weight = 0;
             }
         }
     }
@@ -276,7 +294,23 @@ mod tests {
 
     fn see(around: &mut Surroundings, from: Pose, post: Option<Point>) {
         let ranges = scan(from, post);
-        around.look(from, Ring::Sweep { angle_min: -PI, angle_step: TAU / 720.0, ranges: &ranges }, 10.0);
+        let ring = Ring::Sweep { angle_min: -PI, angle_step: TAU / 720.0, ranges: &ranges };
+        around.look(from, ring, 10.0, None);
+    }
+
+    #[test]
+    fn what_no_beam_touches_any_more_is_forgotten_when_it_is_old_enough() {
+        let mut around = Surroundings::new();
+        see(&mut around, Pose::default(), Some(Point::new(1.0, 0.0)));
+        // It looks to the other side.
+        let away = [10.0; 100];
+        let mut look = || {
+            let ring = Ring::Sweep { angle_min: PI / 2.0, angle_step: PI / 100.0, ranges: &away };
+            around.look(Pose::default(), ring, 10.0, Some(20));
+            around.distance_at(Point::new(0.7, 0.0))
+        };
+        assert!((0..20).all(|_| look() < 0.3), "it may still be there");
+        assert_eq!(look(), FAR);
     }
 
     #[test]

@@ -6,9 +6,7 @@ use record::figure::{Band, Drawing, Event};
 use record::log::{Message, RunInfo};
 use types::cdr::Reader;
 use types::message::Message as Typed;
-use types::messages::{
-    Decision, Echoes, Grant, LaserScan, Odometry, Report, Task, Transforms, Twist,
-};
+use types::messages::{Decision, Echoes, Grant, LaserScan, Odometry, Report, Task, Transforms, Twist};
 use types::{Point, Pose, Time};
 
 use super::TaskOutcome;

@@ -26,6 +26,11 @@ pub struct FloorParams {
     pub gate: f64,
     /// So many scans in a row must not fit before it is searched for. 3: somebody may walk by.
     pub misses: u32,
+    /// The share of beams that may have come through what the plan shows for a scan that does not fit to be one of which people hide the rest: dead
+    /// reckoning goes on. 0.1: in a wrong place of a room a third of the beams are too long.
+    pub through_most: f64,
+    /// So many scans in a row may be hidden before it is searched for. 400: twenty seconds of a laser at 20 Hz; nobody stands around a robot for ever.
+    pub hidden_most: u32,
     /// Deviations of the place (m) and the heading (rad) above which it is not known any more. 0.4 m and 0.35 rad: from nearer a scan finds back by itself.
     pub lost: (f64, f64),
     /// A robot that moved less (m, rad) may see the same scan again. 5 mm and half a degree are less than what its noise hides.
@@ -58,6 +63,8 @@ impl Default for FloorParams {
             inliers_sure: 0.6,
             gate: 25.0,
             misses: 3,
+            through_most: 0.1,
+            hidden_most: 400,
             lost: (0.4, 0.35),
             still: (0.005, 0.01),
             hint: (0.8, 0.6),

@@ -108,6 +108,45 @@ fn one_that_is_carried_elsewhere_is_lost_in_three_scans_and_found_again() {
     assert!(found * 10 >= 9 * (SEEDS / 2), "{found} of {}", SEEDS / 2);
 }
 
+/// What a laser sees when people stand close around it: of four beams three end at them.
+fn among_people(roamer: &Roamer, number: u64) -> Vec<f32> {
+    let draw = Stream::new(7, "people").sample(number);
+    let hide = |(i, range): (usize, f32)| {
+        let person = draw.between(i as u64 / 12, 0.4, 0.9) as f32;
+        if i / 12 % 4 == 0 { range } else { range.min(person + 0.001 * (i % 12) as f32) }
+    };
+    roamer.look().into_iter().enumerate().map(hide).collect()
+}
+
+#[test]
+fn people_who_hide_the_floor_do_not_lose_it_but_being_carried_away_among_them_does() {
+    let floor = floor();
+    for seed in 0..SEEDS / 2 {
+        let mut roamer = Roamer::new(&floor, anywhere(&floor, seed), seed);
+        let mut localizer = lost(&floor, seed);
+        put(&mut localizer, &roamer, roamer.pose);
+        (0..10).for_each(|_| assert_eq!(go(&mut localizer, &mut roamer), Outcome::Fixed));
+        let mut hidden = 0;
+        for scan in 0..100 {
+            // It stands and waits; every tenth scan it goes on.
+            if scan % 10 == 0 {
+                roamer.go();
+            }
+            let outcome = localizer.update(roamer.odometry, &among_people(&roamer, scan), &roamer.geometry);
+            hidden += u32::from(outcome == Outcome::Hidden);
+            assert_eq!(localizer.state(), State::Tracking, "seed {seed} {scan}: {outcome:?}");
+            assert!(off(&localizer, &roamer) < 0.1, "seed {seed} {scan}: {}", off(&localizer, &roamer));
+        }
+        assert!(hidden > 20, "seed {seed}: {hidden}");
+        roamer.pose = anywhere(&floor, 50 + seed);
+        let noticed = (0..400).find(|scan| {
+            let _ = localizer.update(roamer.odometry, &among_people(&roamer, 1000 + scan), &roamer.geometry);
+            localizer.pose().is_none()
+        });
+        assert!(noticed.is_some(), "seed {seed}");
+    }
+}
+
 #[test]
 fn where_two_places_look_the_same_it_names_both_and_decides_for_none() {
     let mut plan = FloorPlan::room(8.0, 4.0);
