@@ -307,7 +307,10 @@ impl<F: Distances> FloorLocalizer<F> {
         let proposed = hypotheses.iter().chain(&elsewhere).filter(|proposed| proposed.weight > 0.0);
         proposed.for_each(|proposed| candidates.propose(floor, scan, proposed.pose, params));
         self.inliers = candidates.places().first().map_or(0.0, |place| place.inliers);
-        if self.searched >= self.params.searched
+        // On a floor that is too large to be looked at as densely in each round it takes as many more.
+        let rounds =
+            (self.cloud.area() * self.params.draws / f64::from(self.params.draws_most.max(1))).max(1.0);
+        if f64::from(self.searched) >= f64::from(self.params.searched) * rounds
             && let Some((pose, information)) = self.candidates.winner(&self.params)
         {
             self.belief = Belief::of(pose, &information);
