@@ -298,7 +298,7 @@ impl Agent for Localizer {
 /// By what it is known where the robot is.
 enum Keeper {
     /// A floor, and landmarks where there are some.
-    Floor(Box<FloorLocalizer<PlanField>>, Watch),
+    Floor(Box<FloorLocalizer<PlanField>>, Box<Watch>),
     /// Landmarks alone.
     Landmarks(Box<LandmarkTracker>),
 }
@@ -321,7 +321,10 @@ impl Tracker {
         } else {
             let floor = PlanField::new(&params.floor).map_err(Fault::of)?;
             let stream = Stream::new(params.seed, "localizer");
-            Keeper::Floor(Box::new(FloorLocalizer::new(floor, params.floor_params(), stream)), params.watch())
+            Keeper::Floor(
+                Box::new(FloorLocalizer::new(floor, params.floor_params(), stream)),
+                Box::new(params.watch()),
+            )
         };
         let mut tracker = Tracker { keeper, heard: None, reckoned: None, is_told: true };
         if params.known_start {

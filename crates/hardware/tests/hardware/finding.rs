@@ -6,8 +6,8 @@ use motion::odometry::Increment;
 use navigation::drift::Drift;
 use navigation::floor::{FreeFloor, GridField};
 use navigation::localisation::floor::{FloorLocalizer, FloorParams};
+use navigation::mapping::Known;
 use navigation::mapping::ray::Lattice;
-use navigation::mapping::{Beam, Known};
 use navigation::matching::{Geometry, MatchParams};
 use navigation::monte_carlo::MonteCarloParams;
 use types::chance::Stream;
@@ -35,7 +35,7 @@ fn looks(recording: &Recording) -> Vec<Look> {
         Record::Scan { form, .. } => Some((form, recording.ranges_of(record))),
         _ => None,
     });
-    let look = |((form, ranges), (pose, mount, _)): ((&LaserScan, &[f32]), (Pose, Pose, Vec<Beam>))| Look {
+    let look = |form: &LaserScan, ranges: &[f32], pose, mount| Look {
         pose,
         geometry: Geometry {
             angle_min: form.angle_min.into(),
@@ -46,7 +46,8 @@ fn looks(recording: &Recording) -> Vec<Look> {
         },
         ranges: ranges.to_vec(),
     };
-    forms.zip(scans(recording)).map(look).collect()
+    let taken = forms.zip(scans(recording));
+    taken.map(|((form, ranges), (pose, mount, _))| look(form, ranges, pose, mount)).collect()
 }
 
 /// What wheels would have told, with what is wrong always and by chance.
