@@ -160,6 +160,9 @@ impl<F: Distances> FloorLocalizer<F> {
     /// Takes what was seen of landmarks at a time, when the wheels said that the robot is at `odometry`. Gives whether anything in it told where that
     /// is. A place that landmarks tell in a search is as one that [somebody says](FloorLocalizer::place): the next scan must confirm it.
     pub fn sees(&mut self, watch: &mut Watch, at: Time, odometry: Pose, seen: &[LandmarkSighting]) -> bool {
+        if watch.marks().is_empty() {
+            return false;
+        }
         let moved = self.moved(odometry);
         self.predict(odometry, moved);
         let (parameters, is_known) = (*watch.parameters(), self.state == State::Tracking);
