@@ -17,6 +17,9 @@
 //!   gate: (z − x⁻)ᵀ (I − I Λ⁻¹ I) (z − x⁻) ≤ χ²
 //! ```
 //!
+//! Landmarks that are seen meanwhile ([`FloorLocalizer::sees`]) correct the same belief by their range and bearing, as
+//! [`sighting`](super::landmarks::sighting) has it; what fits counts as a scan that fits does, so the robot is searched for when neither does.
+//!
 //! While it searches: a cloud ([`crate::monte_carlo`]) and draws from anywhere propose places; each is laid over the floor and followed
 //! from scan to scan. It is decided when one fits and no other fits as well ([`FloorLocalizer::places`] tells them); on a floor that looks the same from
 //! two places that is never.
