@@ -96,7 +96,7 @@ pub struct LocalizerParams {
     /// By landmarks alone: after so many readings in a row in which nothing is where it should be the robot is searched for. 15: a second and more of pictures, in which somebody with colourful clothes may walk by.
     #[param(default = 15u32, min = 1, max = 10000)]
     pub landmark_misses: u32,
-    /// How far the infrared of a landmark is heard (m).
+    /// How far the infrared of a landmark is heard (m). 2 is that of the transmitters of the simulator. Counts from the next start of the agent.
     #[param(default = 2.0, min = 0.1, max = 100.0)]
     pub infrared_reach: f64,
     /// Beams of a scan that are laid over the floor. 181 are one a degree over half a turn; more make it slower and hardly more exact.
@@ -182,7 +182,7 @@ impl LocalizerParams {
         TrackerParams { misses: self.landmark_misses, ..TrackerParams::default() }
     }
 
-    fn watch(&self) -> Watch {
+    fn marks(&self) -> Marks {
         let mark = |row: &Vec<f64>| {
             let [id, x, y] = row.first_chunk().copied()?;
             Some(Mark {
@@ -191,10 +191,11 @@ impl LocalizerParams {
                 facing: row.get(3).copied().unwrap_or_default(),
             })
         };
-        Watch::new(
-            Marks::new(self.landmarks.iter().filter_map(mark), self.infrared_reach),
-            self.landmark_params(),
-        )
+        Marks::new(self.landmarks.iter().filter_map(mark), self.infrared_reach)
+    }
+
+    fn watch(&self) -> Watch {
+        Watch::new(self.marks(), self.landmark_params())
     }
 
     fn floor_params(&self) -> FloorParams {
@@ -252,8 +253,7 @@ impl Agent for Localizer {
     /// Where the robot is, if floor and landmarks are the same.
     fn take_over(&mut self, before: &mut dyn Any) {
         if let Some(before) = before.downcast_mut::<Localizer>()
-            && before.params.floor == self.params.floor
-            && before.params.landmarks == self.params.landmarks
+            && before.tracker.as_ref().is_some_and(|tracker| tracker.is_of(&self.params))
         {
             core::mem::swap(&mut self.tracker, &mut before.tracker);
         }
@@ -298,7 +298,7 @@ impl Agent for Localizer {
 /// By what it is known where the robot is.
 enum Keeper {
     /// A floor, and landmarks where there are some.
-    Floor(Box<FloorLocalizer<PlanField>>, Watch),
+    Floor(Box<FloorLocalizer<PlanField>>, Box<Watch>),
     /// Landmarks alone.
     Landmarks(Box<LandmarkTracker>),
 }
@@ -321,7 +321,10 @@ impl Tracker {
         } else {
             let floor = PlanField::new(&params.floor).map_err(Fault::of)?;
             let stream = Stream::new(params.seed, "localizer");
-            Keeper::Floor(Box::new(FloorLocalizer::new(floor, params.floor_params(), stream)), params.watch())
+            Keeper::Floor(
+                Box::new(FloorLocalizer::new(floor, params.floor_params(), stream)),
+                Box::new(params.watch()),
+            )
         };
         let mut tracker = Tracker { keeper, heard: None, reckoned: None, is_told: true };
         if params.known_start {
@@ -329,6 +332,15 @@ impl Tracker {
             tracker.put(start, params.start_deviation, params.start_heading_deviation);
         }
         Ok(tracker)
+    }
+
+    /// Whether it keeps track on this floor, by these landmarks.
+    fn is_of(&self, params: &LocalizerParams) -> bool {
+        let (is_floor, watch) = match &self.keeper {
+            Keeper::Floor(localizer, watch) => (*localizer.floor().plan() == params.floor, &**watch),
+            Keeper::Landmarks(tracker) => (params.floor.is_empty(), tracker.watch()),
+        };
+        is_floor && *watch.marks() == params.marks()
     }
 
     fn set_params(&mut self, params: &LocalizerParams) {

@@ -7,7 +7,7 @@ use crate::failure::Failure;
 use crate::tool::Tool;
 use crate::workspace::Workspace;
 
-const SCENARIOS: [&str; 3] = ["exploration", "annex", "home"];
+const SCENARIOS: [&str; 4] = ["exploration", "annex", "home", "landmarks"];
 const SEEDS: usize = 10;
 
 /// So many of the seeds must reach the goal; none may touch anything.

@@ -6,6 +6,7 @@
 mod barn;
 mod busy;
 mod data;
+mod finding;
 mod hands;
 mod mapping;
 mod past;

@@ -11,7 +11,7 @@ use types::{Point, Pose};
 use super::data::file;
 
 /// Scans with the pose of the robot at their time, as the recording has it, and where the laser is on the robot.
-fn scans(recording: &Recording) -> Vec<(Pose, Pose, Vec<Beam>)> {
+pub(super) fn scans(recording: &Recording) -> Vec<(Pose, Pose, Vec<Beam>)> {
     let mut pose = Pose::default();
     let mut scans = Vec::new();
     for (_, record) in &recording.records {
@@ -51,7 +51,11 @@ fn spoiled(scans: &[(Pose, Pose, Vec<Beam>)]) -> Vec<Increment> {
     scans.windows(2).map(step).collect()
 }
 
-fn map(poses: impl Iterator<Item = Pose>, scans: &[(Pose, Pose, Vec<Beam>)], lattice: Lattice) -> Occupancy {
+pub(super) fn map(
+    poses: impl Iterator<Item = Pose>,
+    scans: &[(Pose, Pose, Vec<Beam>)],
+    lattice: Lattice,
+) -> Occupancy {
     let mut map = Occupancy::new(Parameters::default(), lattice);
     for (pose, (_, mount, beams)) in poses.zip(scans) {
         map.see(pose.then(*mount), beams.iter().copied());

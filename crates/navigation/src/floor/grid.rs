@@ -19,6 +19,8 @@ pub struct GridField {
     /// Distances of the middles (m).
     distances: Vec<f32>,
     reach: f32,
+    /// Of each cell whether it is known what is there; nothing where all are.
+    known: Option<Box<[bool]>>,
 }
 
 /// Farther than anything on a grid (cells).
@@ -43,7 +45,25 @@ impl GridField {
         }
         transform(&mut squares, columns, rows);
         let distances = squares.iter().map(|square| (sqrt(*square) * cell) as f32).collect();
-        GridField { corner, cell, width: width as i32, height: height as i32, distances, reach: reach as f32 }
+        GridField {
+            corner,
+            cell,
+            width: width as i32,
+            height: height as i32,
+            distances,
+            reach: reach as f32,
+            known: None,
+        }
+    }
+
+    /// The same field, of which only these cells (column, row) are known: in the others nobody stands. A learned map says nothing of what is behind
+    /// its walls, and a robot that is searched for there too is searched for in vain, and found late.
+    pub fn known_only(mut self, is_known: impl Fn(u32, u32) -> bool) -> GridField {
+        let columns = (self.width as usize).max(1);
+        let known = (0..self.distances.len())
+            .map(|place| is_known((place % columns) as u32, (place / columns) as u32));
+        self.known = Some(known.collect());
+        self
     }
 
     fn at(&self, x: i32, y: i32) -> f64 {
@@ -133,11 +153,14 @@ impl Distances for GridField {
 
     fn is_free(&self, at: Point, radius: f64) -> bool {
         let off = (at - self.corner) * (1.0 / self.cell);
-        let inside = (0..self.width).contains(&whole(off.x)) && (0..self.height).contains(&whole(off.y));
+        let (x, y) = (whole(off.x), whole(off.y));
+        if !(0..self.width).contains(&x) || !(0..self.height).contains(&y) {
+            return false;
+        }
+        let place = (y * self.width + x) as usize;
         // Of what stands in a taken cell half may reach out of its middle.
-        inside
-            && f64::from(self.distances[(whole(off.y) * self.width + whole(off.x)) as usize])
-                > radius + self.cell / 2.0
+        self.known.as_ref().is_none_or(|known| known[place])
+            && f64::from(self.distances[place]) > radius + self.cell / 2.0
     }
 
     /// Sphere tracing: as far as nothing is near nothing can be met. What is met is told to a quarter of a cell.

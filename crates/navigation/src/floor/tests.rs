@@ -246,3 +246,17 @@ fn what_is_wrong_in_a_file_is_said_with_its_place() {
     assert!(said[2].starts_with("20 a disc cannot have a radius of -1 m"), "{said:?}");
     assert!(said[3].contains("there is no list of a floor \"pillars\""), "{said:?}");
 }
+
+#[test]
+fn where_nothing_is_known_nobody_stands_and_what_is_near_stays_the_same() {
+    let all = GridField::new(Point::default(), 0.05, (60, 60), 1.0, |x, _| x == 40);
+    // What lies behind the wall was never seen.
+    let seen = all.clone().known_only(|x, _| x <= 40);
+    let (before, behind) = (Point::new(0.5, 1.0), Point::new(2.6, 1.0));
+    assert!(all.is_free(before, 0.2) && all.is_free(behind, 0.2));
+    assert!(seen.is_free(before, 0.2) && !seen.is_free(behind, 0.2));
+    assert_eq!(seen.nearest(behind), all.nearest(behind));
+    // Of 3 m by 3 m the wall of a cell at 2 m and what is nearer to it than 0.2 m is taken.
+    let area = FreeFloor::new(&seen, 0.2).area();
+    assert!((area - 1.8 * 3.0).abs() < 0.35, "{area}");
+}

@@ -17,6 +17,9 @@
 //!   gate: (z − x⁻)ᵀ (I − I Λ⁻¹ I) (z − x⁻) ≤ χ²
 //! ```
 //!
+//! Landmarks that are seen meanwhile ([`FloorLocalizer::sees`]) correct the same belief by their range and bearing, as
+//! [`sighting`](super::landmarks::sighting) has it; what fits counts as a scan that fits does, so the robot is searched for when neither does.
+//!
 //! While it searches: a cloud ([`crate::monte_carlo`]) and draws from anywhere propose places; each is laid over the floor and followed
 //! from scan to scan. It is decided when one fits and no other fits as well ([`FloorLocalizer::places`] tells them); on a floor that looks the same from
 //! two places that is never.
@@ -165,6 +168,9 @@ impl<F: Distances> FloorLocalizer<F> {
     /// Takes what was seen of landmarks at a time, when the wheels said that the robot is at `odometry`. Gives whether anything in it told where that
     /// is. A place that landmarks tell in a search is as one that [somebody says](FloorLocalizer::place): the next scan must confirm it.
     pub fn sees(&mut self, watch: &mut Watch, at: Time, odometry: Pose, seen: &[LandmarkSighting]) -> bool {
+        if watch.marks().is_empty() {
+            return false;
+        }
         let moved = self.moved(odometry);
         self.predict(odometry, moved);
         let (parameters, is_known) = (*watch.parameters(), self.state == State::Tracking);
@@ -329,7 +335,10 @@ impl<F: Distances> FloorLocalizer<F> {
         let proposed = hypotheses.iter().chain(&elsewhere).filter(|proposed| proposed.weight > 0.0);
         proposed.for_each(|proposed| candidates.propose(floor, scan, proposed.pose, params));
         self.inliers = candidates.places().first().map_or(0.0, |place| place.inliers);
-        if self.searched >= self.params.searched
+        // On a floor that is too large to be looked at as densely in each round it takes as many more.
+        let rounds =
+            (self.cloud.area() * self.params.draws / f64::from(self.params.draws_most.max(1))).max(1.0);
+        if f64::from(self.searched) >= f64::from(self.params.searched) * rounds
             && let Some((pose, information)) = self.candidates.winner(&self.params)
         {
             self.belief = Belief::of(pose, &information);

@@ -39,9 +39,10 @@ pub struct FloorParams {
     pub hint: (f64, f64),
     /// So many robots anywhere are looked at in each round of a search, for each square metre. 25: a second place that fits is found within ten scans.
     pub draws: f64,
-    /// And at most so many. 4000 take some milliseconds.
+    /// And at most so many. 4000 take some milliseconds, and are enough for 160 m².
     pub draws_most: u32,
-    /// A search goes on for so many scans at least. 12: after so many a second place that fits was found too, but for one case in a thousand.
+    /// A search goes on for so many scans at least. 12: after so many a second place that fits was found too, but for one case in a thousand. On a
+    /// floor on which [`draws_most`](FloorParams::draws_most) are too few to look so densely it takes as many more.
     pub searched: u32,
     /// A place must have fitted so many scans in a row. 4.
     pub fitted: u32,

@@ -267,8 +267,8 @@ fn dead_reckoning_goes_on_from_the_last_scan() {
     assert!(predicted.position().distance(expected.position()) < 1e-12);
 }
 
-/// Lets a robot in a corridor whose ends are farther away than its laser reaches drive in it for 20 m. Gives how far off it is at most, along and
-/// across.
+/// Lets a robot in a corridor whose ends are farther away than its laser reaches drive in it for 20 m. It is said to be 25 cm farther along than
+/// it is. Gives how far off it is at most after 4 m, along and across.
 fn along_a_corridor(landmarks: bool) -> (f64, f64) {
     let mut plan = FloorPlan::default();
     plan.line(&[Point::new(-30.0, -1.0), Point::new(60.0, -1.0)]);
@@ -276,12 +276,13 @@ fn along_a_corridor(landmarks: bool) -> (f64, f64) {
     let floor = PlanField::new(&plan).unwrap();
     let mut roamer = Roamer::new(&floor, Pose::new(10.0, 0.1, 0.02), 3);
     let mut localizer = lost(&floor, 3);
-    localizer.place(roamer.pose, 0.05, 0.05);
+    let Pose { x, y, heading } = roamer.pose;
+    localizer.place(Pose::new(x + 0.25, y, heading), 0.2, 0.05);
     let marks = (0..10).map(|k| Mark { id: k + 1, at: Point::new(4.0 * f64::from(k), 0.9), facing: 0.0 });
     let parameters = Parameters { range: 0.02, range_part: 0.0, bearing: 0.01, ..Parameters::default() };
     let mut watch = Watch::new(Marks::new(marks.clone(), 2.0), parameters);
     let mut worst = (0.0f64, 0.0f64);
-    for tenth in 0..250 {
+    for tenth in 0..250u64 {
         let _ = go(&mut localizer, &mut roamer);
         let draw = Stream::new(5, "landmarks").sample(tenth);
         let seen = marks.clone().map(|mark| (mark.id, seen_from(roamer.pose, mark.at)));
@@ -299,7 +300,9 @@ fn along_a_corridor(landmarks: bool) -> (f64, f64) {
         }
         let pose = localizer.pose().expect("it is known");
         let off = pose.position() - roamer.pose.position();
-        worst = (worst.0.max(off.x.abs()), worst.1.max(off.y.abs()));
+        if tenth >= 50 {
+            worst = (worst.0.max(off.x.abs()), worst.1.max(off.y.abs()));
+        }
     }
     worst
 }
@@ -307,9 +310,9 @@ fn along_a_corridor(landmarks: bool) -> (f64, f64) {
 #[test]
 fn along_a_corridor_landmarks_tell_what_the_scan_does_not() {
     let ((by_wheels, across), (along, still)) = (along_a_corridor(false), along_a_corridor(true));
-    assert!(by_wheels > 0.07, "a hundredth of the way: {by_wheels}");
-    // A landmark is told to 2 cm, and the last was seen less than 4 m ago, which the wheels tell to 4 cm.
-    assert!(along < 0.05, "{along}");
+    assert!(by_wheels > 0.2, "it goes on as it began: {by_wheels}");
+    // A landmark is told to 2 cm; while the robot turns it sees none, and the wheels are a hundredth off on 4 m and more.
+    assert!(along < 0.1, "{along}");
     assert!(across < 0.02 && still < 0.02, "the walls tell that: {across} {still}");
 }
 

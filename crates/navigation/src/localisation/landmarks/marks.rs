@@ -40,7 +40,7 @@ pub struct Mark {
 }
 
 /// The landmarks that are known.
-#[derive(Clone, Debug, Default)]
+#[derive(Clone, Debug, Default, PartialEq)]
 pub struct Marks {
     marks: Vec<Mark>,
     /// The same, as the filter wants them.

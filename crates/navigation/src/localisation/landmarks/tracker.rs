@@ -148,6 +148,11 @@ impl LandmarkTracker {
         }
     }
 
+    /// What it sees them by.
+    pub const fn watch(&self) -> &Watch {
+        &self.watch
+    }
+
     /// What is known.
     pub fn state(&self) -> State {
         self.state

@@ -44,6 +44,11 @@ impl Watch {
         Watch { marks, parameters, ears: Ears::default(), constellation: Constellation::default() }
     }
 
+    /// The landmarks that it knows.
+    pub const fn marks(&self) -> &Marks {
+        &self.marks
+    }
+
     /// What it goes by.
     pub const fn parameters(&self) -> &Parameters {
         &self.parameters
