@@ -12,6 +12,8 @@ mod asked;
 mod barn;
 mod burden;
 mod compare;
+#[cfg(test)]
+mod deeds;
 mod judge;
 mod knowing;
 mod options;
@@ -23,6 +25,8 @@ mod serve;
 mod summary;
 mod tasks;
 mod timing;
+#[cfg(test)]
+mod trial;
 #[cfg(test)]
 mod trouble;
 mod useful;
