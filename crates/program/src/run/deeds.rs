@@ -89,7 +89,7 @@ fn a_robot_gets_out_of_a_dead_end_and_comes_to_its_goal() {
     let summary = tried("dead-end", &requests, 120).summary;
     let outcome = ends(&summary, 1, Progress::Arrived);
     assert!(outcome.off.unwrap() < 0.02, "{outcome:?}");
-    assert!(summary.noted.iter().any(|noted| noted.text.contains("try to get out")), "{:?}", summary.noted);
+    assert!(summary.noted.iter().any(|noted| noted.what.contains("try to get out")), "{:?}", summary.noted);
     nothing_touched(&summary);
 }
 
@@ -107,7 +107,7 @@ fn a_robot_that_is_boxed_in_tries_and_tells_within_a_minute_that_it_cannot_get_o
     let summary = tried("boxed-in", &requests, 80).summary;
     let outcome = ends(&summary, 1, Progress::Unreachable);
     assert!(outcome.last.seconds < 60.0, "{outcome:?}");
-    assert!(summary.noted.iter().any(|noted| noted.text.contains("try to get out")), "{:?}", summary.noted);
+    assert!(summary.noted.iter().any(|noted| noted.what.contains("try to get out")), "{:?}", summary.noted);
     nothing_touched(&summary);
 }
 
