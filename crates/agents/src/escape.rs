@@ -156,7 +156,10 @@ impl Out {
         if before == Phase::Turning && self.escape.phase() == Phase::Watching {
             self.ahead = Some((here, now));
         }
-        let (from, since) = self.ahead.filter(|_| twist.is_none())?;
+        if twist.is_some() {
+            return twist;
+        }
+        let (from, since) = self.ahead?;
         let left = (params.ahead - from.position().distance(here.position())).min(seen.ahead - params.margin);
         // Twice the time that it takes is more than enough.
         if left <= 0.0 || (now - since).seconds() > 2.0 * params.ahead / params.ahead_speed {

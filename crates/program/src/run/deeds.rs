@@ -46,17 +46,18 @@ fn a_place_is_driven_to_by_the_wheels_alone() {
     let go = "call navigation.go x=3.5 y=3.5 heading=-1.5708 turned=true mode=move";
     let summary = tried("by-wheels", &[(1, go)], 15).summary;
     let outcome = ends(&summary, 1, Progress::Arrived);
-    assert!(outcome.off.unwrap() < 0.02 && outcome.turned.unwrap() < 0.02, "{outcome:?}");
+    // It is aligned within 0.01 rad by what it believes; its gyro is off by 0.002 rad/s, and nothing puts that right for ten seconds.
+    assert!(outcome.off.unwrap() < 0.02 && outcome.turned.unwrap() < 0.031, "{outcome:?}");
     nothing_touched(&summary);
 }
 
 #[test]
 fn a_wall_is_followed_at_its_distance_as_well_as_the_laser_tells_it() {
     let go = "call navigation.go x=1.2 y=2.2 heading=1.5708 turned=true mode=goto";
-    let wall = "call navigation.wall side=left distance=0.8 seconds=50";
-    let trial = tried("wall", &[(1, go), (20, wall)], 75);
+    let wall = "call navigation.wall side=left distance=0.8 seconds=60";
+    let trial = tried("wall", &[(1, go), (20, wall)], 85);
     let outcome = ends(&trial.summary, 2, Progress::Arrived);
-    assert!((outcome.at - 70.0).abs() < 0.5, "{outcome:?}");
+    assert!((outcome.at - 80.0).abs() < 0.5, "{outcome:?}");
     nothing_touched(&trial.summary);
     // How far it is from what it is beside, away from corners: the wall on the left, the shelf, the wall behind it.
     let beside = trial.way.iter().filter(|(time, _)| *time > 22.0).filter_map(|(_, at)| {
@@ -125,7 +126,7 @@ fn modes(trial: &Trial) -> Vec<(f64, String)> {
 #[test]
 fn a_person_takes_the_robot_from_its_way_at_once_and_it_goes_on_when_the_person_falls_silent() {
     let go = "call navigation.go x=9.5 y=1.5 mode=goto";
-    let trial = tried("by-hand", &[(1, go), (6, "call hand.drive angular=0.5 seconds=2")], 60);
+    let trial = tried("by-hand", &[(1, go), (6, "call hand.drive angular=-0.5 seconds=2")], 60);
     let entered = modes(&trial);
     let names: Vec<&str> = entered.iter().map(|(_, name)| name.as_str()).collect();
     assert_eq!(names, ["idle", "goto", "teleoperation", "goto"]);
@@ -136,9 +137,9 @@ fn a_person_takes_the_robot_from_its_way_at_once_and_it_goes_on_when_the_person_
         trial.commands.iter().filter(move |(time, _)| (from..to).contains(time)).map(|(_, twist)| *twist)
     };
     // The order is driven within the limits of the drive, at once: it does not wait for the mode.
-    let first = trial.commands.iter().find(|(time, twist)| *time >= 6.0 && twist.angular > 0.05).unwrap().0;
+    let first = trial.commands.iter().find(|(time, twist)| *time >= 6.0 && twist.angular < -0.05).unwrap().0;
     assert!(first < 6.1, "{first}");
-    assert!(during(7.0, 8.0).all(|twist| twist.linear == 0.0 && (twist.angular - 0.5).abs() < 1e-9));
+    assert!(during(7.0, 8.0).all(|twist| twist.linear == 0.0 && (twist.angular + 0.5).abs() < 1e-9));
     assert!(during(8.5, 9.0).all(|twist| twist.linear == 0.0 && twist.angular == 0.0), "no action is heard");
     let outcome = ends(&trial.summary, 1, Progress::Arrived);
     assert!(outcome.off.unwrap() < 0.02, "{outcome:?}");
