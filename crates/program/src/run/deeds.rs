@@ -71,13 +71,13 @@ fn a_wall_is_followed_at_its_distance_as_well_as_the_laser_tells_it() {
     });
     let mut off: [Vec<f64>; 3] = Default::default();
     beside.for_each(|(which, distance)| off[which].push(distance - 0.8));
-    // One beam is 1 cm wrong, and what is nearest of the ten beams of a direction by no more than three times that.
+    // One beam is 1 cm wrong, what is nearest of the ten beams of a direction by no more than three times that, and the line through the directions once more.
     let noise = 0.01;
     for (which, off) in off.iter().enumerate() {
         assert!(off.len() > 20, "{which}: it never came there, {:?}", trial.way.last());
         let mean = off.iter().sum::<f64>() / off.len() as f64;
         let worst = off.iter().fold(0.0_f64, |worst, off| worst.max(off.abs()));
-        assert!(mean.abs() < 3.0 * noise && worst < 6.0 * noise, "{which}: {mean} m, at most {worst} m");
+        assert!(mean.abs() < 4.0 * noise && worst < 6.0 * noise, "{which}: {mean} m, at most {worst} m");
     }
 }
 
@@ -95,7 +95,7 @@ fn a_robot_gets_out_of_a_dead_end_and_comes_to_its_goal() {
 }
 
 #[test]
-fn a_robot_that_is_boxed_in_tries_and_tells_within_a_minute_that_it_cannot_get_out() {
+fn a_robot_that_is_boxed_in_tries_four_times_and_tells_that_it_cannot_get_out() {
     // Eight posts around it, half a metre apart: it sees out, and is 0.68 m wide.
     let posts = (0..8).map(|i| {
         let at =
@@ -105,9 +105,10 @@ fn a_robot_that_is_boxed_in_tries_and_tells_within_a_minute_that_it_cannot_get_o
     let posts: Vec<String> = posts.collect();
     let mut requests = vec![(1, "call navigation.go x=9.5 y=1.5 mode=goto+avoid")];
     requests.extend(posts.iter().map(|post| (1, post.as_str())));
-    let summary = tried("boxed-in", &requests, 80).summary;
+    let summary = tried("boxed-in", &requests, 115).summary;
     let outcome = ends(&summary, 1, Progress::Unreachable);
-    assert!(outcome.last.seconds < 60.0, "{outcome:?}");
+    // Five times the patience of 8 s, and four times at most 3 s to back off, 3 s to turn and 10 s ahead.
+    assert!(outcome.last.seconds < 104.0, "{outcome:?}");
     assert!(summary.noted.iter().any(|noted| noted.what.contains("try to get out")), "{:?}", summary.noted);
     nothing_touched(&summary);
 }
