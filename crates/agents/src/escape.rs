@@ -242,11 +242,11 @@ mod tests {
         let params = EscapeParams::default();
         let given_up = |is_on_its_way: bool| {
             let mut out = out();
-            let mut told = |i: i64| {
+            let told = |i: i64| {
                 out.advance(&params, Pose::default(), is_on_its_way, Around::default(), at(20 * i));
                 out.escape.phase() == Phase::GivenUp
             };
-            (0..6000).position(|i| told(i)).map(|i| 0.02 * i as f64)
+            (0..6000).position(told).map(|i| 0.02 * i as f64)
         };
         // Four tries of 8 s of patience and 3 s of turning in vain, and the patience with the last.
         let after = given_up(true).unwrap();
