@@ -1,7 +1,7 @@
 //! Escape: notices that the robot does not come on towards its goal, gets it out with a few tries, and tells when they are of no use.
 //!
 //! It stands above the actions that lead the robot to its goal, and wishes nothing while they get on. The states of an escape are in
-//! [`navigation::avoid::escape`].
+//! [`navigation::avoid::escape`]; between turning and watching it drives ahead as far as that is free, so that the others see the place from elsewhere.
 
 use motion::stopping::way_to;
 use navigation::avoid::escape::{self, Escape, Phase, Room};
@@ -19,15 +19,12 @@ pub struct EscapeParams {
     /// Radius of the robot (m). 0.225 is that of the exploring robot.
     #[param(default = 0.225, min = 0.01, max = 2.0)]
     pub radius: f64,
-    /// It is stuck when it has a goal and comes no farther than `distance` in so long (time), and turns by no more than `turned`. 4 s are more than it stands anywhere on its way.
-    #[param(default = Duration::secs(4), min = 0.5, max = 600.0)]
+    /// It is stuck when it has a goal and comes no farther than `distance` in so long (time), however it turns. 8 s are more than it stands and turns anywhere on its way.
+    #[param(default = Duration::secs(8), min = 0.5, max = 600.0)]
     pub patience: Duration,
     /// See `patience` (m).
-    #[param(default = 0.1, min = 0.01, max = 5.0)]
+    #[param(default = 0.25, min = 0.01, max = 5.0)]
     pub distance: f64,
-    /// See `patience` (rad). 20°.
-    #[param(default = 0.35, min = 0.01, max = 3.0)]
-    pub turned: f64,
     /// Nearer to its goal than this it may stand as long as it likes (m): it turns to its heading there.
     #[param(default = 0.5, min = 0.0, max = 10.0)]
     pub near: f64,
@@ -40,7 +37,13 @@ pub struct EscapeParams {
     /// How fast it backs off (m/s).
     #[param(default = 0.15, min = 0.01, max = 2.0)]
     pub back_speed: f64,
-    /// Room that it leaves behind it (m). 8 cm are four times the error of a sonar nearby.
+    /// How far it drives ahead once it has turned, where that is free (m). A metre is past the end of what it stood before.
+    #[param(default = 1.0, min = 0.0, max = 5.0)]
+    pub ahead: f64,
+    /// How fast it drives ahead (m/s).
+    #[param(default = 0.2, min = 0.01, max = 2.0)]
+    pub ahead_speed: f64,
+    /// Room that it leaves behind it, and ahead (m). 8 cm are four times the error of a sonar nearby.
     #[param(default = 0.08, min = 0.0, max = 2.0)]
     pub margin: f64,
     /// Ranges older than this tell nothing of what is behind (time). 600 ms is two missed readings of a sonar at 4 Hz.
@@ -53,7 +56,8 @@ impl EscapeParams {
         escape::Parameters {
             patience: self.patience.seconds(),
             distance: self.distance,
-            turned: self.turned,
+            // One that turns to and fro before what is in its way comes on no more than one that stands.
+            turned: f64::INFINITY,
             tries: self.tries,
             back: self.back,
             back_speed: self.back_speed,
@@ -86,7 +90,7 @@ pub struct EscapeAction {
     duty: Duty,
     place: Whereabouts,
     around: Around,
-    escape: Option<Escape>,
+    out: Option<Out>,
 }
 
 impl Agent for EscapeAction {
@@ -100,17 +104,16 @@ impl Agent for EscapeAction {
         let task = self.duty.task(step.name_of(step.agent).unwrap_or_default().as_str());
         let task = task.filter(|task| matches!(task.motion, Motion::Goto | Motion::Path));
         if self.duty.is_new(task.as_ref(), now) {
-            self.escape = Some(Escape::new(self.params.parameters()));
+            self.out = Some(Out { escape: Escape::new(self.params.parameters()), ahead: None });
         }
-        let (Some(task), Some(escape), Some(here)) = (task, &mut self.escape, self.place.odometry) else {
+        let (Some(task), Some(out), Some(here)) = (task, &mut self.out, self.place.odometry) else {
             self.report.send(NOTHING);
             return Ok(());
         };
         let far = self.place.goal(&task).map(|goal| goal.distance(here.pose.position()));
         let is_on_its_way = far.is_some_and(|far| far > self.params.near);
-        let room = self.around.room(&self.params, now);
-        let (twist, is_over) = advance(escape, here.pose, is_on_its_way, room, now);
-        if let Some(twist) = twist {
+        let seen = self.around.fresh(&self.params, now);
+        if let Some(twist) = out.advance(&self.params, here.pose, is_on_its_way, seen, now) {
             self.drive.send(offer(twist, now));
         }
         let over = Report {
@@ -120,51 +123,86 @@ impl Agent for EscapeAction {
             angle: 0.0,
             seconds: self.duty.seconds(now),
         };
-        self.report.send(if is_over { over } else { NOTHING });
+        self.report.send(if out.escape.phase() == Phase::GivenUp { over } else { NOTHING });
         Ok(())
     }
 }
 
-/// The motion to get out, while there is something to get out of, and whether that is of no use.
-fn advance(
-    escape: &mut Escape,
-    here: Pose,
-    is_on_its_way: bool,
-    room: Room,
-    now: Time,
-) -> (Option<Twist>, bool) {
-    let tries = escape.tries();
-    let twist = escape.step((now - Time::ZERO).seconds(), here, is_on_its_way, room);
-    if escape.tries() > tries {
-        runtime::note!("it does not come on to its goal: try to get out number {}", escape.tries());
-    }
-    (twist, escape.phase() == Phase::GivenUp)
+/// The way out.
+#[derive(Clone, Copy, Debug)]
+struct Out {
+    escape: Escape,
+    /// While it drives ahead: from where, and since when.
+    ahead: Option<(Pose, Time)>,
 }
+
+impl Out {
+    /// The motion to get out, while there is something to get out of.
+    fn advance(
+        &mut self,
+        params: &EscapeParams,
+        here: Pose,
+        is_on_its_way: bool,
+        seen: Around,
+        now: Time,
+    ) -> Option<Twist> {
+        let (tries, before) = (self.escape.tries(), self.escape.phase());
+        let is_ahead = self.ahead.is_some();
+        let twist =
+            self.escape.step((now - Time::ZERO).seconds(), here, is_on_its_way && !is_ahead, seen.room);
+        if self.escape.tries() > tries {
+            runtime::note!("it does not come on to its goal: try to get out number {}", self.escape.tries());
+        }
+        if before == Phase::Turning && self.escape.phase() == Phase::Watching {
+            self.ahead = Some((here, now));
+        }
+        if twist.is_some() {
+            return twist;
+        }
+        let (from, since) = self.ahead?;
+        let left = (params.ahead - from.position().distance(here.position())).min(seen.ahead - params.margin);
+        // Twice the time that it takes is more than enough.
+        if left <= 0.0 || (now - since).seconds() > 2.0 * params.ahead / params.ahead_speed {
+            self.ahead = None;
+            return None;
+        }
+        Some(Twist::new(params.ahead_speed.min(CREEP + left), 0.0))
+    }
+}
+
+/// So fast it is at the end of its way ahead (m/s); so fast it also slows on the last metre (1/s).
+const CREEP: f64 = 0.05;
 
 /// What was heard around the robot.
 #[derive(Clone, Copy, Debug, Default)]
 struct Around {
     room: Room,
+    /// Free way ahead (m).
+    ahead: f64,
     heard: Option<Time>,
 }
 
 impl Around {
     fn of(params: &EscapeParams, ranges: &Ranges, stamp: Time) -> Around {
-        let back = Twist::new(-1.0, 0.0);
-        let mut room = Room { behind: f64::from(ranges.range_max), wider: 0.0 };
+        let farthest = f64::from(ranges.range_max);
+        let mut around =
+            Around { room: Room { behind: farthest, wider: 0.0 }, ahead: farthest, heard: Some(stamp) };
+        let way = |sign: f64, x: f64, y: f64| way_to(params.radius, Twist::new(sign, 0.0), x, y);
         for (bearing, range) in echoes(ranges) {
             let (x, y) = (range * libm::cos(bearing), range * libm::sin(bearing));
-            room.behind = room.behind.min(way_to(params.radius, back, x, y));
+            around.room.behind = around.room.behind.min(way(-1.0, x, y));
+            around.ahead = around.ahead.min(way(1.0, x, y));
             // What is near on one side pushes to the other.
-            room.wider -= libm::sin(bearing) / range.max(0.1);
+            around.room.wider -= libm::sin(bearing) / range.max(0.1);
         }
-        Around { room, heard: Some(stamp) }
+        around
     }
 
-    fn room(&self, params: &EscapeParams, now: Time) -> Room {
+    /// The same, without any room where it was heard too long ago.
+    fn fresh(&self, params: &EscapeParams, now: Time) -> Around {
         match self.heard {
-            Some(heard) if now - heard <= params.stale => self.room,
-            _ => Room { behind: 0.0, ..self.room },
+            Some(heard) if now - heard <= params.stale => *self,
+            _ => Around { room: Room { behind: 0.0, ..self.room }, ahead: 0.0, ..*self },
         }
     }
 }
@@ -183,29 +221,60 @@ mod tests {
         let params = EscapeParams { radius: 0.3, ..EscapeParams::default() };
         let mut ranges = blank(16, 0.15, 5.0);
         ranges.values.fill(5.0);
-        ranges.values[8] = 1.0;
-        let room = Around::of(&params, &ranges, at(0)).room(&params, at(100));
-        assert!((room.behind - 0.7).abs() < 1e-6, "{room:?}");
-        assert_eq!(Around::of(&params, &ranges, at(0)).room(&params, at(700)).behind, 0.0, "too old");
-        assert_eq!(Around::default().room(&params, at(0)).behind, 0.0, "never heard");
+        (ranges.values[8], ranges.values[0]) = (1.0, 1.5);
+        let seen = Around::of(&params, &ranges, at(0)).fresh(&params, at(100));
+        assert!((seen.room.behind - 0.7).abs() < 1e-6 && (seen.ahead - 1.2).abs() < 1e-6, "{seen:?}");
+        let old = Around::of(&params, &ranges, at(0)).fresh(&params, at(700));
+        assert_eq!((old.room.behind, old.ahead), (0.0, 0.0), "too old");
+        assert_eq!(Around::default().fresh(&params, at(0)).room.behind, 0.0, "never heard");
         // A wall on the left, and so the wider side is the right.
         (ranges.values[4], ranges.values[8]) = (0.5, 5.0);
-        let room = Around::of(&params, &ranges, at(0)).room(&params, at(0));
+        let room = Around::of(&params, &ranges, at(0)).room;
         assert!(room.wider < -1.0 && room.behind == 5.0, "{room:?}");
+    }
+
+    fn out() -> Out {
+        Out { escape: Escape::new(EscapeParams::default().parameters()), ahead: None }
     }
 
     #[test]
     fn a_robot_that_is_held_is_given_up_after_its_tries_and_one_at_its_goal_is_not_stuck() {
         let params = EscapeParams::default();
-        let shut = Room { behind: 0.0, wider: 0.0 };
         let given_up = |is_on_its_way: bool| {
-            let mut escape = Escape::new(params.parameters());
-            let told = |i: i64| advance(&mut escape, Pose::default(), is_on_its_way, shut, at(20 * i)).1;
-            (0..6000).map(told).position(|is_over| is_over).map(|i| 0.02 * i as f64)
+            let mut out = out();
+            let told = |i: i64| {
+                out.advance(&params, Pose::default(), is_on_its_way, Around::default(), at(20 * i));
+                out.escape.phase() == Phase::GivenUp
+            };
+            (0..6000).position(told).map(|i| 0.02 * i as f64)
         };
-        // Four tries of 4 s of patience and 3 s of turning in vain, and the patience with the last.
+        // Four tries of 8 s of patience and 3 s of turning in vain, and the patience with the last.
         let after = given_up(true).unwrap();
-        assert!((31.5..33.5).contains(&after), "{after}");
+        assert!((51.5..53.0).contains(&after), "{after}");
         assert_eq!(given_up(false), None);
+    }
+
+    #[test]
+    fn it_backs_off_turns_and_drives_ahead_before_it_lets_the_others_drive() {
+        let params = EscapeParams::default();
+        let (mut out, mut body) = (out(), Pose::default());
+        let free = Around { room: Room { behind: 3.0, wider: 1.0 }, ahead: 3.0, heard: None };
+        let mut done: Vec<(i64, i64)> = Vec::new();
+        for i in 0..1200 {
+            let twist = out.advance(&params, body, true, free, at(20 * i)).unwrap_or(Twist::ZERO);
+            let sign = |x: f64| if x == 0.0 { 0 } else { x.signum() as i64 };
+            let now = (sign(twist.linear), sign(twist.angular));
+            if done.last() != Some(&now) {
+                done.push(now);
+            }
+            body = body.advanced(twist.linear, twist.angular, 0.02);
+            if done.len() == 5 {
+                break;
+            }
+        }
+        assert_eq!(done, [(0, 0), (-1, 0), (0, 1), (1, 0), (0, 0)]);
+        // 0.3 m back, 0.7 rad to the left, a metre ahead.
+        let expected = (-0.3 + 0.7f64.cos(), 0.7f64.sin());
+        assert!((body.x - expected.0).abs() < 0.05 && (body.y - expected.1).abs() < 0.05, "{body:?}");
     }
 }

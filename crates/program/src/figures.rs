@@ -119,6 +119,36 @@ pub(crate) fn rates(log: &Path) -> Result<Rates, String> {
     Ok(Rates { sent, misses, rest })
 }
 
+/// Messages of one kind, each with its time (s).
+#[cfg(test)]
+pub(crate) type Told<T> = Vec<(f64, T)>;
+
+/// Where the only robot of a log truly was.
+#[cfg(test)]
+pub(crate) fn way(log: &Path) -> Result<Told<types::Pose>, String> {
+    let mut reader = Reader::open(log).map_err(|error| error.to_string())?;
+    let mut trail = Trail::new(&reader.run().cloned().unwrap_or_default());
+    while let Some(message) = reader.next_message().map_err(|error| error.to_string())? {
+        trail.take(&message);
+    }
+    Ok(trail.robots.into_values().next().map(|seen| seen.way).unwrap_or_default())
+}
+
+/// What went out of a port in a simulated run; the topic is of the form "/agent/port".
+#[cfg(test)]
+pub(crate) fn told<T: types::message::Message>(log: &Path, topic: &str) -> Result<Told<T>, String> {
+    let mut reader = Reader::open(log).map_err(|error| error.to_string())?;
+    let mut told = Vec::new();
+    while let Some(message) = reader.next_message().map_err(|error| error.to_string())? {
+        if &*message.channel.topic == topic
+            && let Some((head, _)) = trail::decode::<T>(&message)
+        {
+            told.push((message.time.seconds(), head));
+        }
+    }
+    Ok(told)
+}
+
 /// The names of the robots of a log.
 pub(crate) fn robots(notes: &Notes) -> Vec<String> {
     scenery::robots(notes).into_iter().map(|robot| robot.name).collect()

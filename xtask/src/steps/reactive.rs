@@ -11,7 +11,7 @@ use crate::workspace::Workspace;
 
 /// How the tasks of the scenario end, in their order. The second goal lies behind a crate, and it goes there straight; the thirteenth drives
 /// against a step that no sensor sees.
-const ENDS: [&str; 14] = [
+const ENDS: [&str; 17] = [
     "arrived",
     "unreachable",
     "arrived",
@@ -25,14 +25,20 @@ const ENDS: [&str; 14] = [
     "arrived",
     "arrived",
     "unreachable",
+    "arrived",
+    "arrived",
+    "arrived",
     "arrived",
 ];
 /// The figures of its parts.
-const FIGURES: [&str; 7] = ["goto", "goto-avoid", "move", "turns", "soft-stop", "path", "hard-stop"];
+const FIGURES: [&str; 9] =
+    ["goto", "goto-avoid", "move", "turns", "soft-stop", "path", "hard-stop", "wall", "dock"];
+/// The one that docks.
+const DOCK: u64 = 17;
 /// So far from their places robots may truly be when they tell that they have arrived (m).
 const OFF: f64 = 0.02;
-/// The same at the end of a path, which is as long as the robot counts it (m).
-const OFF_PATH: f64 = 0.04;
+/// The same in a dock (m, rad).
+const OFF_DOCK: (f64, f64) = (0.01, 0.01);
 const GOALS: usize = 300;
 /// How many places it comes to among people, at least: ten minutes, and most are reached within one.
 const AMONG_PEOPLE: usize = 4;
@@ -68,11 +74,15 @@ fn calls(workspace: &Workspace, program: &std::path::Path) -> Result<(), Failure
     let folder = workspace.fresh_scratch("calls")?;
     let words = ["reactive", "--clock", "wall", "--for", "60s", "--no-log"];
     let running = Running::start(program, &folder, &words, REMEDY)?;
-    let asked: [(&[&str], bool); 7] = [
+    let asked: [(&[&str], bool); 11] = [
         (&["call", "navigation.go", "x=3", "y=3"], true),
         (&["call", "navigation.go", "xx=3"], false),
         (&["call", "navigation.come", "x=3"], false),
         (&["call", "world.add", "name=wall", "x=6", "y=1", "length=0.2", "width=1"], true),
+        (&["call", "navigation.go", "x=2", "y=6", "heading=1.57", "dock=true"], true),
+        (&["call", "navigation.wall", "side=left", "distance=0.8", "seconds=5"], true),
+        (&["call", "hand.drive", "angular=0.2", "seconds=1"], true),
+        (&["call", "hand.release"], true),
         (&["call", "processes.change", "name=idle"], true),
         (&["graph"], true),
         (&["quit"], true),
@@ -104,8 +114,13 @@ fn parts(run: &Value) -> Result<(), String> {
             return Err(format!("task {number} ended {}, not \"{expected}\": {task}", task["ended"]));
         }
         let off = task["off_m"].as_f64().unwrap_or(0.0);
-        if *expected == "arrived" && off > OFF_PATH {
+        let most = if number == DOCK { OFF_DOCK.0 } else { OFF };
+        if *expected == "arrived" && off > most {
             return Err(format!("task {number} arrived {off} m off"));
+        }
+        let turned = task["off_rad"].as_f64().unwrap_or(0.0);
+        if number == DOCK && turned > OFF_DOCK.1 {
+            return Err(format!("task {number} docked {turned} rad off"));
         }
     }
     // The step, once; nothing else.
@@ -156,11 +171,15 @@ mod tests {
 
     #[test]
     fn a_part_that_ends_otherwise_is_named() {
-        let mut tasks: Vec<Value> = (0..).zip(ENDS).map(|(i, ended)| task(i + 1, ended, 0.01)).collect();
+        let mut tasks: Vec<Value> = (0..).zip(ENDS).map(|(i, ended)| task(i + 1, ended, 0.009)).collect();
         let run = |tasks: &[Value], collisions: u64| json!({"tasks": tasks, "collisions": collisions});
         assert_eq!(parts(&run(&tasks, 1)), Ok(()));
         assert!(parts(&run(&tasks, 2)).unwrap_err().contains("2 collisions"));
         assert!(parts(&run(&tasks[..13], 1)).unwrap_err().contains("task 14"));
+        tasks[16]["off_rad"] = json!(0.02);
+        assert!(parts(&run(&tasks, 1)).unwrap_err().contains("docked 0.02 rad off"));
+        tasks[16] = task(17, "arrived", 0.011);
+        assert!(parts(&run(&tasks, 1)).unwrap_err().contains("task 17 arrived 0.011 m off"));
         tasks[3] = task(4, "arrived", 0.3);
         assert!(parts(&run(&tasks, 1)).unwrap_err().contains("task 4 arrived 0.3 m off"));
         tasks[2] = task(3, "timed out", 0.0);

@@ -78,7 +78,7 @@ const PERSON: f64 = 0.25;
 /// More events than this cannot be explained below a figure.
 const MOST_EVENTS: usize = 12;
 
-fn decode<T: Typed>(message: &Message) -> Option<(T, Vec<T::Element>)> {
+pub(super) fn decode<T: Typed>(message: &Message) -> Option<(T, Vec<T::Element>)> {
     let mut row = Vec::new();
     let head = T::decode(&mut Reader::new(&message.cdr).ok()?, &mut row).ok()?;
     Some((head, row))

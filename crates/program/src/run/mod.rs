@@ -12,6 +12,8 @@ mod asked;
 mod barn;
 mod burden;
 mod compare;
+#[cfg(test)]
+mod deeds;
 mod judge;
 mod knowing;
 mod many;
@@ -24,6 +26,8 @@ mod serve;
 mod summary;
 mod tasks;
 mod timing;
+#[cfg(test)]
+mod trial;
 #[cfg(test)]
 mod trouble;
 mod useful;

@@ -1,68 +1,9 @@
 //! What becomes of a goal when something goes wrong on the way: the scenario `reactive` with other requests.
 
-use std::sync::Arc;
-
-use runtime::TimedRequest;
-use types::Duration;
 use types::messages::Progress;
 
 use super::summary::Summary;
-use super::{ClockChoice, One, Place, RunArgs, options, with_robots};
-use crate::figures::TaskOutcome;
-
-/// Runs the reactive layer for so many seconds with these requests, each at its second.
-fn asked(name: &str, requests: &[(i64, &str)], seconds: i64) -> Summary {
-    #[derive(clap::Parser)]
-    struct Line {
-        #[command(flatten)]
-        run: RunArgs,
-    }
-    let folder = std::env::temp_dir().join(format!("sinew-trouble-{}-{name}", std::process::id()));
-    let line: Line = clap::Parser::parse_from(["run", "reactive"]);
-    let args = RunArgs { limit: Some(Duration::secs(seconds)), ..line.run };
-    let mut scenario = options::scenario(&args, with_robots(agents::registry())).unwrap();
-    let timed = |(at, text): &(i64, &str)| TimedRequest {
-        at: Duration::secs(*at),
-        words: text.split_whitespace().map(str::to_owned).collect(),
-        place: Default::default(),
-    };
-    scenario.file.plan.requests = requests.iter().map(timed).collect();
-    // Its parts are drawn of other times.
-    scenario.file.plan.sections.remove("figure");
-    let ready = scenario.prepare(1).unwrap();
-    let one = One {
-        facts: None,
-        args: &args,
-        scenario: &scenario,
-        seed: 1,
-        clock: ClockChoice::Sim,
-        watched: false,
-        place: Some(Place::in_folder(folder.clone(), &args).unwrap()),
-        asked_to_end: Arc::default(),
-        serves: false,
-        repeat: None,
-        knowing: None,
-    };
-    let summary = one.run(ready).unwrap();
-    let refused: Vec<_> = summary.incidents.iter().filter(|told| told.what.contains("refused")).collect();
-    assert!(refused.is_empty(), "{refused:?}");
-    std::fs::remove_dir_all(folder).unwrap();
-    summary
-}
-
-fn ended(summary: &Summary, task: u32) -> &TaskOutcome {
-    summary.tasks.iter().find(|known| known.task == task).unwrap_or_else(|| panic!("{:?}", summary.tasks))
-}
-
-fn ends(summary: &Summary, task: u32, expected: Progress) -> &TaskOutcome {
-    let task = ended(summary, task);
-    assert_eq!(task.last.progress, expected, "{task:?}");
-    task
-}
-
-fn nothing_touched(summary: &Summary) {
-    assert_eq!(summary.collisions(), Some(0), "{:?}", summary.tasks);
-}
+use super::trial::{asked, ended, ends, nothing_touched};
 
 /// How far the robot went (m).
 fn way(summary: &Summary) -> f64 {
