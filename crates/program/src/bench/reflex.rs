@@ -69,7 +69,7 @@ impl Agent for Eager {
 /// A chain of ready-made agents behind a driver.
 struct Chain {
     eye: Eye,
-    /// Makes the plan, but for the robot.
+    /// Adds the agents to the plan of a robot.
     agents: fn(&mut Plan),
     wires: &'static [(&'static str, &'static str)],
     /// What makes an agent run, and the place of its executor among those of a robot.
