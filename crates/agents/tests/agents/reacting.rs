@@ -4,7 +4,6 @@
 use std::sync::{Arc, Mutex};
 
 use agents::avoid::AvoidParams;
-use agents::navigator::NavigatorParams;
 use agents::{Avoid, Coordinator, DriveBase, EmergencyStopAction, Navigator};
 use navigation::floor::{Disc, Distances, FloorPlan, PlanField};
 use navigation::localisation::association::Landmark;
@@ -215,11 +214,10 @@ impl Agent for Witness {
 fn run(seconds: f64) -> (Report, Heard) {
     let mut plan = Plan::new("reacting");
     let body = plan.add::<Body>("body", Default::default());
-    let avoid = |law: &str| AvoidParams { law: law.into(), width: 0.4, cone: 0.0, ..AvoidParams::default() };
+    let avoid = |law: &str| AvoidParams { law: law.into(), cone: 0.0, ..AvoidParams::default() };
     let nearness = plan.add::<Avoid>("nearness", avoid("nearness"));
     let smooth = plan.add::<Avoid>("smooth", avoid("smooth"));
-    let navigator =
-        plan.add::<Navigator>("navigator", NavigatorParams { width: 0.4, ..NavigatorParams::default() });
+    let navigator = plan.add::<Navigator>("navigator", Default::default());
     let stop = plan.add::<EmergencyStopAction>("stop", Default::default());
     let coordinator = plan.add::<Coordinator>("coordinator", Default::default());
     let drive = plan.add::<DriveBase>("drive", Default::default());
