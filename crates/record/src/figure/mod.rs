@@ -188,4 +188,16 @@ mod tests {
         assert_eq!((lines("#0072b2"), lines("#d55e00"), lines("#009e73")), (1 + 2, 1 + 1, 0));
         assert!(svg.contains(">track</text>") && svg.contains(">x (m)</text>"));
     }
+
+    #[test]
+    fn a_crowd_is_one_line_of_the_key_and_a_few_have_one_each() {
+        let with = |many: usize| {
+            let way = vec![Point { x: 0.0, y: 0.0 }, Point { x: 1.0, y: 1.0 }];
+            let others = (0..many).map(|i| (format!("walker {i}"), way.clone())).collect();
+            Trajectory { others, ..Trajectory::default() }.draw().svg()
+        };
+        let (few, many) = (with(3), with(12));
+        assert!(few.contains(">walker 2</text>") && !few.contains("others"));
+        assert!(many.contains(">12 others</text>") && !many.contains("walker"));
+    }
 }

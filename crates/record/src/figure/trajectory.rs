@@ -83,7 +83,7 @@ impl Trajectory {
             picture.dots(self.points.iter().map(|p| frame.at(p.x, p.y)).collect(), 0.9, POINT);
             self.outlines(picture, frame);
             for (i, (_, points)) in self.others.iter().enumerate() {
-                picture.line(points.iter().map(|p| frame.at(p.x, p.y)).collect(), other(i));
+                picture.line(points.iter().map(|p| frame.at(p.x, p.y)).collect(), self.other(i));
             }
             self.way(picture, frame, &agents);
             if let Some(first) = self.path.first() {
@@ -101,8 +101,12 @@ impl Trajectory {
         for (i, agent) in agents.iter().enumerate() {
             key.add(Sign::Line(acting(i)), *agent);
         }
-        for (i, (name, _)) in self.others.iter().enumerate() {
-            key.add(Sign::Line(other(i)), name);
+        if self.is_crowded() {
+            key.add(Sign::Line(self.other(0)), format!("{} others", self.others.len()));
+        } else {
+            for (i, (name, _)) in self.others.iter().enumerate() {
+                key.add(Sign::Line(self.other(i)), name);
+            }
         }
         if !self.points.is_empty() {
             key.add(Sign::Dot(POINT), &self.points_name);
@@ -117,6 +121,16 @@ impl Trajectory {
         key
     }
 
+    /// Whether there are so many others that no eye could tell their ways apart.
+    fn is_crowded(&self) -> bool {
+        self.others.len() > FEW
+    }
+
+    /// The way of another; those of a crowd lie pale behind that of the robot.
+    fn other(&self, i: usize) -> Pen {
+        if self.is_crowded() { Pen::new(CROWD, 0.5) } else { other(i) }
+    }
+
     /// The path, a line for each stretch of one agent.
     fn way(&self, picture: &mut Picture, frame: &Frame, agents: &[&str]) {
         let who = |w: &Waypoint| active(&self.bands, agents, w.time);
@@ -128,7 +142,8 @@ impl Trajectory {
             // One point more, so that stretches touch.
             let to = (from + len).min(self.path.len() - 1);
             let points = self.path[from..=to].iter().map(place).collect();
-            picture.line(points, agent.map_or(Pen::new(NOBODY, 1.8), acting));
+            let nobody = if agents.is_empty() { INK } else { NOBODY };
+            picture.line(points, agent.map_or(Pen::new(nobody, 1.8), acting));
             from = to;
         }
     }
@@ -204,6 +219,10 @@ fn acting(i: usize) -> Pen {
     let pen = Pen::new(Colour::of(i), 1.8);
     if i < PALETTE.len() { pen } else { pen.dashed(5.0, 1.5) }
 }
+
+/// Up to so many others each have a line of their own in the key.
+const FEW: usize = 6;
+const CROWD: Colour = Colour::hex(0xd6dade);
 
 fn other(i: usize) -> Pen {
     Pen::new(if i == 0 { INK } else { Colour::of(i + 3) }, 1.0).dashed(4.0, 2.0)
