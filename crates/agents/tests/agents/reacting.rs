@@ -6,9 +6,9 @@ use std::sync::{Arc, Mutex};
 use agents::avoid::AvoidParams;
 use agents::{Avoid, Coordinator, DriveBase, EmergencyStopAction, Navigator};
 use navigation::floor::{Disc, Distances, FloorPlan, PlanField};
-use navigation::localisation::association::Landmark;
-use navigation::localisation::sighting::seen_from;
-use navigation::localisation::{self, Filter};
+use navigation::localisation::landmarks::association::Landmark;
+use navigation::localisation::landmarks::sighting::seen_from;
+use navigation::localisation::landmarks::{Filter, LandmarkLocalizer, Parameters};
 use runtime::{
     Agent, AgentType, Declare, Fault, Input, NoParams, Output, Plan, Report, Simulation, Step, registry,
 };
@@ -107,16 +107,16 @@ struct Believer {
     odometry: Input<Odometry>,
     /// Where it believes to be.
     pose: Output<Odometry>,
-    localizer: Option<localisation::Localizer>,
+    localizer: Option<LandmarkLocalizer>,
     n: usize,
 }
 
 impl Agent for Believer {
     fn start(&mut self, step: &mut Step) -> Result<(), Fault> {
-        let parameters = localisation::Parameters::default();
+        let parameters = Parameters::default();
         let pose = Pose::new(PLACES[0].x + 0.05, PLACES[0].y, 0.02);
         let filter = Filter::new(&parameters, pose, [[0.01, 0.0, 0.0], [0.0, 0.01, 0.0], [0.0, 0.0, 0.01]]);
-        self.localizer = Some(localisation::Localizer::new(parameters, filter, step.now, 128));
+        self.localizer = Some(LandmarkLocalizer::new(parameters, filter, step.now, 128));
         Ok(())
     }
 
