@@ -44,6 +44,8 @@ pub struct WireCounts {
     pub taken: AtomicU64,
     /// Taken by a receiver that asked for the newest, those among them that it passed over.
     pub newest: AtomicU64,
+    /// How often the receiver looked into the memory of the sender instead.
+    pub looked: AtomicU64,
     /// Links whose message had left the memory before it was read.
     pub expired: AtomicU64,
 }

@@ -379,7 +379,7 @@ pub struct WireView {
     pub filter: WireFilter,
     /// Messages put into it.
     pub sent: u64,
-    /// Messages that newer ones displaced before a receiver that only ever asks for the newest.
+    /// Messages that newer ones displaced before a receiver that only ever asks for the newest, or looks into the sender's memory.
     pub replaced: u64,
     /// Messages that were displaced or dropped, and that the receiver would have taken.
     pub dropped: u64,
@@ -396,7 +396,8 @@ pub struct WireView {
 pub struct WireTotals {
     /// Messages put into them.
     pub sent: u64,
-    /// Messages that newer ones displaced before a receiver that only ever asks for the newest: it would have passed over them.
+    /// Messages that newer ones displaced before a receiver that only ever asks for the newest, or looks into the sender's memory: it
+    /// would have passed over them.
     pub replaced: u64,
     /// Messages that were displaced or dropped otherwise, or lay in a wire that was cut and were never taken.
     pub dropped: u64,
@@ -410,11 +411,12 @@ pub struct WireTotals {
 
 impl WireTotals {
     pub(crate) fn of(counts: &WireCounts) -> WireTotals {
-        let [displaced, dropped, one_by_one, newest] =
-            [&counts.displaced, &counts.dropped, &counts.taken, &counts.newest]
+        let [displaced, dropped, one_by_one, newest, looked] =
+            [&counts.displaced, &counts.dropped, &counts.taken, &counts.newest, &counts.looked]
                 .map(|count| count.load(Relaxed));
         // Whoever takes one message after the other misses each that is displaced, and of who takes none nobody knows.
-        let (replaced, lost) = if one_by_one == 0 && newest > 0 { (displaced, 0) } else { (0, displaced) };
+        let (replaced, lost) =
+            if one_by_one == 0 && newest + looked > 0 { (displaced, 0) } else { (0, displaced) };
         WireTotals {
             sent: counts.sent.load(Relaxed),
             replaced,

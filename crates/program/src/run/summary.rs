@@ -73,7 +73,7 @@ pub(crate) struct Summary {
     pub(crate) robots: Vec<RobotOutcome>,
     pub(crate) agents: Vec<AgentView>,
     pub(crate) sent: u64,
-    /// Messages that newer ones displaced where only the newest is asked for.
+    /// Messages that newer ones displaced before who would have passed over them.
     pub(crate) replaced: u64,
     /// Messages that were lost.
     pub(crate) dropped: u64,

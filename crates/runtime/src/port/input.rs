@@ -339,7 +339,10 @@ impl<T: Message> Input<T> {
     /// beyond the last where the type says how, else the nearest.
     pub fn at(&self, time: Time) -> Option<Found<T>> {
         self.core.as_ref()?.inner().lanes.iter().find_map(|lane| match &lane.source {
-            Source::Link(_, seat) => seat.at(time),
+            Source::Link(_, seat) => {
+                count(&lane.counts.looked);
+                seat.at(time)
+            }
             Source::Value(_) | Source::Queue(_) => None,
         })
     }

@@ -1,10 +1,11 @@
 //! What is on a wire when it is cut.
 
 use runtime::{
-    Agent, Fault, Input, Options, Overload, Plan, Report, Simulation, Step, WirePlan, WireTotals, registry,
+    Agent, Fault, Input, Options, Output, Overload, Plan, Report, Simulation, Step, WirePlan, WireTotals,
+    registry,
 };
 use types::Duration;
-use types::messages::Twist;
+use types::messages::{Odometry, Twist};
 
 use crate::{Sink, Source, SourceParams, at, heard, options, sink, types};
 
@@ -57,6 +58,34 @@ fn what_nobody_took_is_counted_as_dropped() {
     assert_eq!((heard.len(), removed.view.past), (1, lost), "a mailbox goes with its agent");
 }
 
+/// Tells a pose now and then.
+#[derive(Agent)]
+struct Walker {
+    /// Where it is.
+    #[port(history = 8)]
+    pose: Output<Odometry>,
+}
+
+impl Agent for Walker {
+    fn step(&mut self, _: &mut Step) -> Result<(), Fault> {
+        self.pose.send(Odometry::default());
+        Ok(())
+    }
+}
+
+/// Looks up where somebody was, and takes nothing.
+#[derive(Agent)]
+struct Looker {
+    /// Where.
+    pose: Input<Odometry>,
+}
+
+impl Agent for Looker {
+    fn step(&mut self, step: &mut Step) -> Result<(), Fault> {
+        self.pose.at(step.now).map(drop).ok_or_else(|| Fault::new("nobody was anywhere"))
+    }
+}
+
 /// Asks for the newest alone.
 #[derive(Agent)]
 struct Gauge {
@@ -95,4 +124,19 @@ fn what_a_newer_one_displaced_is_replaced_for_who_asks_for_the_newest_and_droppe
     let report = Simulation::new(&plan, &types, options(6000)).unwrap().run().unwrap();
     let past = WireTotals { sent: 51, taken: 1, replaced: 46, dropped: 4, ..WireTotals::default() };
     assert_eq!(report.view.past, past);
+}
+
+#[test]
+fn what_is_looked_up_in_memory_and_never_taken_is_not_lost() {
+    let mut plan = Plan::new("looked");
+    let walker = plan.add::<Walker>("walker", Default::default());
+    let looker = plan.add::<Looker>("looker", Default::default());
+    plan.wire(&walker.pose, &looker.pose);
+    plan.every("walker", Duration::millis(10));
+    plan.every("looker", Duration::millis(10));
+    let report = Simulation::new(&plan, &registry![Walker, Looker], options(1000)).unwrap().run().unwrap();
+    assert!(report.incidents.is_empty(), "{:?}", report.incidents);
+    let [wire] = &report.view.wires[..] else { panic!("{:?}", report.view.wires) };
+    // Four lie in the mailbox still.
+    assert_eq!((wire.sent, wire.taken, wire.replaced, wire.dropped), (101, 0, 97, 0));
 }

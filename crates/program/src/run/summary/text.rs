@@ -121,8 +121,7 @@ impl Summary {
     fn messages(&self) -> String {
         let mut text = format!("{} sent, {} dropped", self.sent, self.dropped);
         if self.replaced > 0 {
-            text +=
-                &format!(", {} replaced by newer ones before who asks for the newest alone", self.replaced);
+            text += &format!(", {} replaced by newer ones", self.replaced);
         }
         if self.refused > 0 {
             text += &format!(", {} given back to their senders", self.refused);
