@@ -58,11 +58,13 @@ pub(super) fn run(workspace: &Workspace, program: &std::path::Path) -> Result<St
     let words = ["run", "goals", "--set", &random, "--for", "135min", "--json", "--out"];
     let goals = sinew::document(Tool::new(program, &workspace.root).args(words).arg(&out), REMEDY)?;
     let most = all_reached(&goals).map_err(|what| Failure::new(format!("goals: {what}"), REMEDY))?;
-    // Its log is of hundreds of megabytes.
+    // Logs of hundreds of megabytes.
     let _ = std::fs::remove_dir_all(&out);
-    let words = ["run", "crowd", "--for", "10min", "--no-log", "--json"];
-    let crowd = sinew::document(Tool::new(program, &workspace.root).args(words), REMEDY)?;
+    let out = workspace.fresh_scratch("crowd")?;
+    let words = ["run", "crowd", "--for", "10min", "--json", "--out"];
+    let crowd = sinew::document(Tool::new(program, &workspace.root).args(words).arg(&out), REMEDY)?;
     let places = among_people(&crowd).map_err(|what| Failure::new(format!("crowd: {what}"), REMEDY))?;
+    let _ = std::fs::remove_dir_all(&out);
     Ok(format!(
         "reactive, {GOALS} goals at most {:.0} mm off, {places} places among people without a collision",
         most * 1e3
