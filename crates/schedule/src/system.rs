@@ -128,10 +128,10 @@ pub enum Unsound {
     TooFine,
 }
 
-/// Responses on several processors are told to a deadline's 2^-12.
+/// Responses on several processors are sought in steps of a deadline's 2^-12.
 const GRAIN: u32 = 12;
-/// More rounds than most sets need.
-const ROUNDS: usize = 100;
+/// More rounds than most sets need: those in which two agents keep each other waiting come near to their responses by small steps.
+const ROUNDS: usize = 1000;
 /// A response of so many times the longest period is as good as none.
 const LONG: i128 = 64;
 
@@ -433,15 +433,21 @@ impl Whole<'_> {
         let room = streams[at].iter().map(|flow| flow.row.period - flow.row.jitter).min()?;
         let limit = room.min(numbers.deadline);
         let sum = |work: &[Carried], ready: i128| work.iter().map(|work| work.within(ready)).sum::<i128>();
-        // Where all that falls into a time fits into it, that time is long enough. It grows in steps, not by ticks.
-        let step = (numbers.deadline >> GRAIN).max(1);
-        let mut ready = numbers.cost.max(1);
+        // Where all that falls into a time fits into it, that time is long enough. Only parts of the deadline are tried, and what is told is the
+        // work: so that a longer step never gives a shorter response.
+        let deadline = numbers.deadline.max(1);
+        // The first whole tick of a part that is no less.
+        let part = |time: i128| {
+            let parts = ((time - 1) << GRAIN) / deadline + 1;
+            (parts * deadline + (1 << GRAIN) - 1) >> GRAIN
+        };
+        let mut ready = part(numbers.cost.max(1));
         while ready <= limit {
             let all = numbers.cost + sum(&beside, ready) + sum(&above, ready) / processors;
             if all <= ready {
-                return Some(ready);
+                return Some(all);
             }
-            ready = (all + step - 1) / step * step;
+            ready = part(all);
         }
         None
     }

@@ -205,7 +205,7 @@ impl<'a> Search<'a> {
         let mut free = vec![true; rooms.len()];
         let mut settings = self.compressed(rooms, settings, &free)?;
         loop {
-            let is_left = |at: &usize| free[*at] && is_lengthened(&rooms[*at], &settings[*at]);
+            let is_left = |at: &usize| free[*at] && half_back(&rooms[*at], &settings[*at]).is_some();
             let left: Vec<usize> = by_importance(rooms).into_iter().rev().filter(is_left).collect();
             for at in &left {
                 free[*at] = self.fits(&with_half_back(rooms, &settings, *at))?;
@@ -295,20 +295,17 @@ impl<'a> Search<'a> {
     }
 }
 
-/// Whether it gives of its period so much that it is worth to give of it back.
-fn is_lengthened(room: &Room, setting: &Setting) -> bool {
-    let (Some((from, _)), Some(period)) = (room.period, setting.period) else { return false };
-    period > from * Exact::new(1001, 1000)
+/// The period of one that has half of what it lengthened it by; nothing for one that gives so little that it is not worth to give back of it.
+fn half_back(room: &Room, setting: &Setting) -> Option<Exact> {
+    let ((from, _), period) = (room.period?, setting.period?);
+    let half = whole_between(from, period, near(from + (period - from) / Exact::from_integer(2)));
+    (period > from * Exact::new(1001, 1000) && half < period).then_some(half)
 }
 
-/// The same, when this one has half of what it lengthened its period by.
+/// The same settings with that period.
 fn with_half_back(rooms: &[Room], settings: &[Setting], at: usize) -> Vec<Setting> {
     let mut back = settings.to_vec();
-    if let (Some((from, _)), Some(period)) = (rooms[at].period, settings[at].period) {
-        let half = near(from + (period - from) / Exact::from_integer(2));
-        // Rounded down, so that it is less in any case.
-        back[at].period = Some(rounded_down(half).clamp(from, period));
-    }
+    back[at].period = half_back(&rooms[at], &settings[at]).or(back[at].period);
     back
 }
 
