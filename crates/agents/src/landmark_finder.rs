@@ -16,17 +16,16 @@ use libm::cos;
 use navigation::calibration::tube::Tube as Polynomial;
 use perception::colour::ColourRange;
 use perception::picture::Size;
-use perception::recognise::Form;
 use perception::target::Camera;
 use perception::tube::{Tube, TubeFinder, TubePattern};
 use runtime::{Agent, Envelope, Fault, Input, Output, Step};
 use types::geometry::{PI, wrap};
-use types::messages::{Encoding, Head, Image, LandmarkSighting, Landmarks};
+use types::messages::{Head, Image, LandmarkSighting, Landmarks};
 use types::value::{Mistake, Table};
 use types::{Duration, params::Params};
 
 use crate::recogniser::ColourPattern;
-use crate::shared::{BODY, Dated};
+use crate::shared::{BODY, Dated, form};
 
 /// Which tubes are looked for, and how far away they are.
 #[derive(Clone, Debug, Params)]
@@ -172,15 +171,7 @@ impl Eye {
         const WRONG: Fault = Fault::new(
             "a landmark finder needs whole pictures: RGB at \"rgb\", or those of the output \"hsi\" of a camera",
         );
-        let form = match picture.encoding {
-            Encoding::Rgb8 => Form::Rgb,
-            Encoding::Hsi8 => Form::Hsi,
-            Encoding::Mono8 => return Err(WRONG),
-        };
-        if row.len() != picture.len() || row.is_empty() {
-            return Err(WRONG);
-        }
-        let size = Size::new(picture.width as usize, picture.height as usize);
+        let (form, size) = form(picture, row).ok_or(WRONG)?;
         let camera = Camera { size, horizontal_field_of_view: picture.field_of_view.into() };
         let tubes = self.fit(size).find(row, form, &params.pattern()).map_err(|_| WRONG)?;
         let mut told = Landmarks { frame: BODY.into(), ..Landmarks::default() };
@@ -218,6 +209,7 @@ fn sighting(params: &LandmarkFinderParams, camera: &Camera, head: Head, tube: &T
 #[cfg(test)]
 mod tests {
     use super::*;
+    use types::messages::Encoding;
 
     /// f = 160 / tan(0.5) = 292.9 px.
     const FIELD: f32 = 1.0;

@@ -10,14 +10,16 @@
 
 use perception::colour::ColourRange;
 use perception::picture::Size;
-use perception::recognise::{Form, Method, Pattern, Recogniser as Finder, Seen};
+use perception::recognise::{Method, Pattern, Recogniser as Finder, Seen};
 use perception::target::{Camera, target};
 use runtime::{Agent, Fault, Input, Output, Step};
 use types::Name;
 use types::geometry::wrap;
-use types::messages::{Encoding, Head, Image, Sighting};
+use types::messages::{Head, Image, Sighting};
 use types::params::{ParamValue, Params};
 use types::value::{Table, Value};
+
+use crate::shared::form;
 
 /// A range of colours, as a file gives it: `{ hue_from = 350, hue_to = 10, saturation = 0.35, value = 0.12 }`, hues in degrees and going up,
 /// the others the least from 0 to 1. What is left out is as in the default, which is red.
@@ -175,20 +177,12 @@ impl Eye {
         const WRONG: Fault = Fault::new(
             "a recogniser needs whole pictures: RGB at \"rgb\", or those of the output \"hsi\" of a camera",
         );
-        let form = match picture.encoding {
-            Encoding::Rgb8 => Form::Rgb,
-            Encoding::Hsi8 => Form::Hsi,
-            Encoding::Mono8 => return Err(WRONG),
-        };
-        if row.len() != picture.len() || row.is_empty() {
-            return Err(WRONG);
-        }
+        let (form, size) = form(picture, row).ok_or(WRONG)?;
         let pattern = Pattern {
             colour: params.pattern.colours(),
             share_min: params.share_min,
             roundness_min: params.roundness_min,
         };
-        let size = Size::new(picture.width as usize, picture.height as usize);
         self.fit(size).find(row, form, &pattern, method).map_err(|_| WRONG)
     }
 }
@@ -220,6 +214,7 @@ fn sighting(
 #[cfg(test)]
 mod tests {
     use super::*;
+    use types::messages::Encoding;
 
     const WIDTH: usize = 320;
     const HEIGHT: usize = 240;

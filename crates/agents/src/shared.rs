@@ -2,13 +2,26 @@
 
 use motion::fusion::SHARES_MAX;
 use motion::ring::Ring;
+use perception::picture::Size;
+use perception::recognise::Form;
 use perception::sonar::{RiskParams, risk};
 use types::geometry::TAU;
-use types::messages::{Offer, Ranges, Risk};
+use types::messages::{Encoding, Image, Offer, Ranges, Risk};
 use types::{AgentId, Duration, Time};
 
 /// The frame of the robot's body, at whose origin all distances begin.
 pub(crate) const BODY: &str = "base_link";
+
+/// How the pixels of a picture in colour are to be read, and its size; nothing where it has no colours, or is not whole.
+pub(crate) fn form(picture: &Image, row: &[u8]) -> Option<(Form, Size)> {
+    let form = match picture.encoding {
+        Encoding::Rgb8 => Form::Rgb,
+        Encoding::Hsi8 => Form::Hsi,
+        Encoding::Mono8 => return None,
+    };
+    let is_whole = row.len() == picture.len() && !row.is_empty();
+    is_whole.then(|| (form, Size::new(picture.width as usize, picture.height as usize)))
+}
 
 /// Ranges in the form that the laws of motion take.
 pub(crate) fn ring(ranges: &Ranges) -> Ring<'_> {
