@@ -78,6 +78,9 @@ pub(super) fn measure(setting: &Setting<'_>) -> Result<Outcome, Failure> {
     let answers = rounds::all(&floors, setting.of(ROUNDS, 1));
     let mut outcome = Outcome::default();
     outcome.text(crate::run::table(&rounds::table(&answers), 1));
+    if floors.len() > 1 {
+        outcome.text(crate::run::table(&rounds::maps(&floors, &answers), 1));
+    }
     let (exact, field) = (answers.row(contender::EXACT), answers.row(contender::FIELD));
     for row in &answers.rows {
         outcome.figure(row.name, "us", row.spans());

@@ -3,23 +3,27 @@
 //! In a round each planner answers all queries of a map before the next one has its turn, so none finds what another has left in the caches.
 
 use super::super::outcome::median;
-use super::contender::{self, Answer, PEER};
+use super::contender::{self, Answer, EXACT, FIELD, PEER};
 use super::{Floor, Query, SAME};
 
 /// What all have answered, over all maps.
 pub(super) struct Answers {
     queries: Vec<Query>,
+    /// How many of them are on each map.
+    counts: Vec<usize>,
     /// The other system first.
     pub(super) rows: Vec<Row>,
 }
 
 /// What one has answered: the rounds of each query.
+#[derive(Clone)]
 pub(super) struct Row {
     pub(super) name: &'static str,
     answers: Vec<Judged>,
 }
 
 /// The answers to one query, and whether they were right.
+#[derive(Clone)]
 struct Judged {
     optimum: Option<f64>,
     rounds: Vec<Answer>,
@@ -27,7 +31,7 @@ struct Judged {
 
 /// Lets all answer all queries so many times.
 pub(super) fn all(floors: &[Floor], rounds: usize) -> Answers {
-    let mut answers = Answers { queries: Vec::new(), rows: Vec::new() };
+    let mut answers = Answers { queries: Vec::new(), counts: Vec::new(), rows: Vec::new() };
     for floor in floors {
         let mut contenders = contender::all(&floor.grid);
         if answers.rows.is_empty() {
@@ -35,6 +39,7 @@ pub(super) fn all(floors: &[Floor], rounds: usize) -> Answers {
         }
         let before = answers.queries.len();
         answers.queries.extend(&floor.queries);
+        answers.counts.push(floor.queries.len());
         for row in &mut answers.rows {
             row.answers.extend(
                 floor.queries.iter().map(|query| Judged { optimum: query.length, rounds: Vec::new() }),
@@ -132,6 +137,19 @@ impl Answers {
         self.row(PEER)
     }
 
+    /// The same for each map by itself.
+    fn by_map(&self) -> Vec<Answers> {
+        let mut before = 0;
+        let part = |count: &usize| {
+            let part = before..before + count;
+            before = part.end;
+            let row = |row: &Row| Row { name: row.name, answers: row.answers[part.clone()].to_vec() };
+            let rows = self.rows.iter().map(row).collect();
+            Answers { queries: self.queries[part.clone()].to_vec(), counts: vec![*count], rows }
+        };
+        self.counts.iter().map(part).collect()
+    }
+
     pub(super) fn with_a_way(&self) -> usize {
         self.queries.iter().filter(|query| query.length.is_some()).count()
     }
@@ -154,7 +172,6 @@ impl Answers {
 pub(super) fn table(answers: &Answers) -> Vec<[String; 9]> {
     let head = ["planner", "queries", "found", "right", "us", "speed-up", "first us", "speed-up", "optimal"];
     let peer = answers.peer();
-    let number = |x: f64| if x >= 100.0 { format!("{x:.0}") } else { format!("{x:.1}") };
     let row = |row: &Row| {
         [
             row.name.to_owned(),
@@ -169,4 +186,28 @@ pub(super) fn table(answers: &Answers) -> Vec<[String; 9]> {
         ]
     };
     [head.map(str::to_owned)].into_iter().chain(answers.rows.iter().map(row)).collect()
+}
+
+/// For people, of several maps: what is asked of the exact search and of the field, on each.
+pub(super) fn maps(floors: &[Floor], answers: &Answers) -> Vec<[String; 5]> {
+    let head = ["map", "queries", "jump: speed-up", "field: first", "field: optimal"];
+    let row = |(floor, answers): (&Floor, Answers)| {
+        let (peer, field) = (answers.peer(), answers.row(FIELD));
+        [
+            floor.name.clone(),
+            answers.with_a_way().to_string(),
+            number(median(answers.row(EXACT).speed_ups(peer))),
+            number(median(field.first_speed_ups(peer))),
+            format!("{:.1} %", 100.0 * field.optimal_share(peer)),
+        ]
+    };
+    [head.map(str::to_owned)].into_iter().chain(floors.iter().zip(answers.by_map()).map(row)).collect()
+}
+
+fn number(x: f64) -> String {
+    if x.is_nan() {
+        // On a map whose queries have no way at all.
+        return "–".to_owned();
+    }
+    if x >= 100.0 { format!("{x:.0}") } else { format!("{x:.1}") }
 }

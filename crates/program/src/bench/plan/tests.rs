@@ -23,6 +23,17 @@ fn all_planners_find_the_same_lengths_on_our_own_maps() {
 }
 
 #[test]
+fn each_map_has_a_row_of_its_own_queries() {
+    let floors = small();
+    let rows = rounds::maps(&floors, &rounds::all(&floors, 1));
+    assert_eq!(rows.len(), floors.len() + 1);
+    for (floor, row) in floors.iter().zip(&rows[1..]) {
+        let with_a_way = floor.queries.iter().filter(|query| query.length.is_some()).count();
+        assert_eq!((&row[0], &row[1]), (&floor.name, &with_a_way.to_string()));
+    }
+}
+
+#[test]
 fn each_way_in_the_picture_goes_down_in_the_potential_beside_it() {
     for floor in small() {
         for query in floor.queries.iter().filter(|query| query.length.is_some()) {
