@@ -12,7 +12,7 @@ use std::time::Instant;
 use sim::{Model, Simulator, Stream, WorldPlan};
 use types::Time;
 
-#[path = "../tests/common/mod.rs"]
+#[path = "../tests/world/common.rs"]
 mod common;
 
 const HOUR: f64 = 3600.0;

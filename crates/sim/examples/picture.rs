@@ -10,7 +10,7 @@ use sim::{Model, Simulator, Vary};
 use types::value::Table;
 use types::{Point, Pose};
 
-#[path = "../tests/common/mod.rs"]
+#[path = "../tests/world/common.rs"]
 mod common;
 
 /// Pixels a metre of the plan of the floor.
