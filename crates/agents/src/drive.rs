@@ -61,6 +61,10 @@ pub struct DriveParams {
     /// How long a reflex bounds the motion (time). 300 ms outlasts one period of a sonar at 4 Hz.
     #[param(default = Duration::millis(300), min = 0.0, max = 10.0)]
     pub reflex_hold: Duration,
+    /// Whether it stands while no reflex says how fast it may drive: then whoever sends the reflex must not fall silent. An emergency stop speaks in
+    /// each of its steps, the reflex of a sonar only when it has something to say.
+    #[param(default = false)]
+    pub reflex_needed: bool,
     /// Change of speed for the greatest "speed up" (m/s). 0.3: no one word takes it from rest to full speed.
     #[param(default = 0.3, min = 0.0, max = 10.0)]
     pub speed_change: f64,
@@ -242,6 +246,7 @@ struct Hands {
     orders: Offers,
     safety: Option<Dated<Safety>>,
     reflex: Option<Dated<Twist>>,
+    is_unguarded: bool,
     motion: Option<Twist>,
     answer: Answer,
     heed: Heed,
@@ -265,8 +270,15 @@ impl Hands {
         self.cuts = limited.cuts;
         self.commanded = match Dated::fresh(&self.reflex, now, params.reflex_hold) {
             Some(bound) => bounded(limited.twist, bound),
+            None if params.reflex_needed => Twist::ZERO,
             None => limited.twist,
         };
+        let is_unguarded =
+            params.reflex_needed && Dated::fresh(&self.reflex, now, params.reflex_hold).is_none();
+        if is_unguarded && !self.is_unguarded {
+            runtime::note!("nobody says how fast it may drive: standing");
+        }
+        self.is_unguarded = is_unguarded;
         self.commanded
     }
 
@@ -440,6 +452,25 @@ mod tests {
         assert_eq!(last(1000, 1500, 0.4, 0.1), 0.0);
         assert_eq!(last(1500, 3000, 0.4, 0.6), 0.0, "that it is safe now makes it no better");
         assert!(last(3000, 9000, 0.4, 0.6) > 0.39);
+    }
+
+    #[test]
+    fn a_drive_that_needs_a_reflex_stands_while_nobody_says_how_fast_it_may_drive() {
+        let params = DriveParams { reflex_needed: true, acceleration: 100.0, ..DriveParams::default() };
+        let mut hands = Hands::default();
+        let mut command = |millis: i64, reflex: bool| {
+            let now = Time::ZERO + Duration::millis(millis);
+            hands.wish = Some(Dated { value: Twist::new(0.3, 0.0), stamp: now });
+            if reflex {
+                hands.reflex = Some(Dated { value: Twist::new(1e3, 1e3), stamp: now });
+            }
+            hands.command(&params, false, now).linear
+        };
+        assert_eq!((command(0, false), command(20, false)), (0.0, 0.0), "nobody has spoken yet");
+        assert!(command(40, true) > 0.0 && command(60, true) > 0.0);
+        assert!(command(360, false) > 0.0, "the last word counts for 300 ms");
+        assert_eq!((command(380, false), command(400, false)), (0.0, 0.0));
+        assert!(command(420, true) > 0.0, "and it goes on when somebody speaks again");
     }
 
     #[test]

@@ -3,7 +3,7 @@
 //! ```text
 //!  scan, ranges ──▶ way ahead along the arc ─┐
 //!  odometry, wish ─▶ where it drives ────────┴▶ critical range? ──▶ bound ──▶ reflex of the drive
-//!  bumper ──▶ told as a hard stop                                   (the latch itself is set by the driver)
+//!  bumper, latch ──▶ told as a hard stop                            (the latch itself is set by the driver)
 //! ```
 //!
 //! Where people walk about it is told how fast, and slows in time so that whoever runs into the robot finds it standing: [`motion::passive`].
@@ -15,7 +15,7 @@ use motion::passive;
 use motion::stopping::{Parameters, Stopping, Verdict, way_to};
 use runtime::{Agent, Fault, Input, Output, Step};
 use types::geometry::TAU;
-use types::messages::{Bumper, EmergencyStop, LaserScan, Odometry, Ranges, StopKind, Twist};
+use types::messages::{Bumper, EmergencyStop, LaserScan, Latch, Odometry, Ranges, StopKind, Twist};
 use types::params::Params;
 use types::{Duration, Point, Pose, Time};
 
@@ -101,7 +101,10 @@ pub struct EmergencyStopAction {
     /// Whether it touches something.
     #[robot("bumper")]
     bumper: Input<Bumper>,
-    /// The most that may be driven, for the drive's reflex; silent while the way is clear.
+    /// Whether the robot is latched.
+    #[robot("latch")]
+    latch: Input<Latch>,
+    /// The most that may be driven, for the drive's reflex, in each step: a drive that needs it stands when nobody tells.
     bound: Output<Twist>,
     /// What it makes of the way ahead.
     #[port(history = 64)]
@@ -131,6 +134,9 @@ impl Agent for EmergencyStopAction {
         if let Some(bumper) = self.bumper.latest() {
             self.guard.touched = bumper.pressed();
         }
+        if let Some(latch) = self.latch.latest() {
+            self.guard.latched = latch.is_set;
+        }
         let sees = [self.scan.is_wired(), self.ranges.is_wired()];
         let told = self.guard.judge(&self.params, sees, now);
         if told.kind == StopKind::Soft && !self.guard.told {
@@ -142,12 +148,8 @@ impl Agent for EmergencyStopAction {
             );
         }
         self.guard.told = told.kind == StopKind::Soft;
-        let bounds = told.allowed.is_finite();
-        if bounds || self.guard.bounded {
-            // It may turn away on the spot. When it lets go it says so, or the last bound would hold for a while.
-            self.bound.send(Twist::new(told.allowed.min(ANY), ANY));
-        }
-        self.guard.bounded = bounds;
+        // It may turn away on the spot.
+        self.bound.send(Twist::new(told.allowed.min(ANY), ANY));
         self.stop.send(told);
         Ok(())
     }
@@ -175,8 +177,8 @@ struct Guard {
     motion: Twist,
     wish: Twist,
     touched: bool,
+    latched: bool,
     told: bool,
-    bounded: bool,
     forward: Stopping,
     backward: Stopping,
     last: Option<Time>,
@@ -193,8 +195,8 @@ impl Default for Guard {
             motion: Twist::ZERO,
             wish: Twist::ZERO,
             touched: false,
+            latched: false,
             told: false,
-            bounded: false,
             forward: Stopping::new(Parameters::default()),
             backward: Stopping::new(Parameters::default()),
             last: None,
@@ -282,12 +284,20 @@ impl Guard {
         let people =
             self.among_people(params, Twist::new(if is_back { -STANDING } else { STANDING }, turn), sees);
         let (stopping, allowed) = (stopping || people < self.motion.linear.abs(), allowed.min(people));
-        let kind = match (self.touched, stopping) {
+        let kind = match (self.touched || self.latched, stopping) {
             (true, _) => StopKind::Hard,
             (false, true) => StopKind::Soft,
             (false, false) => StopKind::None,
         };
-        EmergencyStop { kind, blind, ahead, critical, allowed, speed: self.motion.linear }
+        EmergencyStop {
+            kind,
+            blind,
+            latched: self.latched,
+            ahead,
+            critical,
+            allowed,
+            speed: self.motion.linear,
+        }
     }
 }
 

@@ -10,10 +10,10 @@
 //!
 //! A task goes through when its mode is there, so no action ever works on a task in the mode of another. Whoever the mode names must be heard
 //! of again and again; who is not for too long makes the robot stand, without waiting for the ordinary side to notice. A task that is over
-//! makes it stand, too.
+//! makes it stand, too, and a latch that is set ends the task: to reset it moves nothing.
 
 use runtime::{Agent, Fault, Input, Output, Step};
-use types::messages::{MOST_AGENTS, Mode, Progress, Report, Task};
+use types::messages::{EmergencyStop, MOST_AGENTS, Mode, Progress, Report, Task};
 use types::params::Params;
 use types::{AgentId, Duration, Name, Sequence, Time};
 
@@ -37,6 +37,8 @@ pub struct RealTimeSupervisor {
     task: Input<Task>,
     /// What actions tell of their tasks; each tells something in every step.
     reports: Input<Report>,
+    /// Whether the robot is latched: a task ends by that, or the robot would set off when somebody resets it.
+    stop: Input<EmergencyStop>,
     /// The mode in force, when it changes and once a second.
     modes: Output<Mode>,
     /// The task, when it changes and once a second.
@@ -72,6 +74,11 @@ impl Agent for RealTimeSupervisor {
         }
         if let Some(progress) = over {
             self.door.stand(progress);
+            changed = true;
+        }
+        if self.stop.latest().is_some_and(|stop| stop.latched) && self.door.is_underway() {
+            runtime::note!("the emergency stop is set: what was being done has ended");
+            self.door.stand(Progress::Halted);
             changed = true;
         }
         if self.door.somebody_is_silent(&self.params, |name| step.agent_named(name), now) {
@@ -163,6 +170,11 @@ impl Door {
         Some(report.progress).filter(|progress| progress.is_over())
     }
 
+    /// Whether somebody may drive for a task.
+    fn is_underway(&self) -> bool {
+        self.task.number != 0 && !self.status.progress.is_over()
+    }
+
     /// Makes the robot stand; the status tells why.
     fn stand(&mut self, why: Progress) {
         self.status.progress = if self.task.number == 0 { Progress::Idle } else { why };
@@ -251,6 +263,17 @@ mod tests {
         assert_eq!((door.status.progress, door.status.distance), (Progress::Arrived, 0.004));
         assert_eq!(door.hear(GOTO, report(Progress::Unreachable), at(80)), None, "it has ended already");
         assert_eq!(door.status.progress, Progress::Arrived);
+    }
+
+    #[test]
+    fn only_a_task_that_is_not_over_can_be_ended_by_the_latch() {
+        let mut door = Door::default();
+        assert!(!door.is_underway(), "there is none");
+        door = underway();
+        assert!(door.is_underway());
+        door.stand(Progress::Halted);
+        assert!(!door.is_underway());
+        assert_eq!((door.status.progress, door.mode.name.as_str()), (Progress::Halted, IDLE));
     }
 
     #[test]

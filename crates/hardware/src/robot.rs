@@ -5,7 +5,7 @@
 //!   drive    ─▶│                                   │─▶ sonar scan image ticks bumper gyro battery head
 //!   head_to  ─▶│  commands ─▶ Gate ◀─▶ Driver      │─▶ landmarks   (seen, or heard by infrared)
 //!              │                                   │─▶ pose        (a recording's own, in the frame "log")
-//!   safety   ─▶│                                   │─▶ transforms  (where the sensors sit)
+//!   safety   ─▶│                                   │─▶ latch, transforms  (where the sensors sit)
 //!              └───────────────────────────────────┘
 //! ```
 
@@ -13,8 +13,8 @@ use std::sync::{Arc, Mutex};
 
 use runtime::{Agent, AgentType, Envelope, Fault, Input, Output, Step};
 use types::messages::{
-    Battery, Bumper, Echoes, Gyro, Head, Image, Landmarks, LaserScan, Odometry, Safety, Transforms, Twist,
-    WheelTicks,
+    Battery, Bumper, Echoes, Gyro, Head, Image, Landmarks, LaserScan, Latch, Odometry, Safety, Transforms,
+    Twist, WheelTicks,
 };
 use types::params::Params;
 use types::{Duration, Time};
@@ -26,6 +26,8 @@ use crate::latch::{Cause, LatchState};
 
 /// How often the mounts are told.
 const MOUNTS_EVERY: Duration = Duration::secs(1);
+/// Whoever listens to the latch hears so often that nothing has changed.
+const LATCH_EVERY: Duration = Duration::millis(100);
 /// The period of a gate: a controller at 50 Hz waits half of its own period for it at most, and physics steps as often.
 pub const CYCLE: Duration = Duration::millis(10);
 
@@ -129,6 +131,8 @@ pub struct Robot {
     /// What is seen or heard of landmarks.
     #[port(raw)]
     landmarks: Output<Landmarks>,
+    /// Whether it is latched: when that changes, and ten times a second.
+    latch: Output<Latch>,
     /// Where the sensors sit.
     #[port(rows = 64)]
     transforms: Output<Transforms>,
@@ -143,6 +147,7 @@ pub struct Robot {
     berth: Berth,
     gate: Option<Gate>,
     next_mounts: Time,
+    latched: Option<(Latch, Time)>,
 }
 
 impl Robot {
@@ -235,6 +240,14 @@ impl Agent for Robot {
         let cycle = gate.apply(now).map_err(|error| Fault { what: error.what })?;
         if let Some(event) = cycle.event {
             note(event, gate);
+        }
+        if self.latch.has_listeners() {
+            let state = gate.latch().state();
+            let latch = Latch { is_set: state.is_set(), resets: state.resets() };
+            if self.latched.is_none_or(|(told, at)| told != latch || now - at >= LATCH_EVERY) {
+                self.latched = Some((latch, now));
+                self.latch.send(latch);
+            }
         }
         if now >= self.next_mounts && self.transforms.has_listeners() {
             self.next_mounts = now + MOUNTS_EVERY;

@@ -41,7 +41,7 @@ use crate::floor::Distances;
 use crate::linear::{Matrix, deviations, diagonal};
 use crate::localisation::State;
 use crate::localisation::landmarks::{Believer, Effect, Errors, Filter, Parameters, Sight, Watch};
-use crate::matching::{Geometry, MatchParams, NoMatch, Scan, came_through, match_carefully};
+use crate::matching::{Geometry, Match, MatchParams, NoMatch, Scan, came_through, match_carefully};
 use crate::monte_carlo::{Hypothesis, MOST_HYPOTHESES, MonteCarlo};
 use belief::Belief;
 use candidates::Candidates;
@@ -78,8 +78,10 @@ pub struct FloorLocalizer<F> {
     /// The digest of the last scan, and where the wheels said that it was first seen.
     last: Option<(u64, Pose)>,
     misses: u32,
-    /// Scans in a row that were hidden.
+    /// Scans in a row that were hidden while the robot was under way.
     hidden: u32,
+    /// Whether the wheels have rolled since the scan before.
+    is_moving: bool,
     /// Whether the last scan that was not a repetition fits.
     is_fixed: bool,
     /// Whether a scan has confirmed what somebody said.
@@ -106,6 +108,7 @@ impl<F: Distances> FloorLocalizer<F> {
             last: None,
             misses: 0,
             hidden: 0,
+            is_moving: false,
             is_fixed: false,
             is_confirmed: false,
             inliers: 0.0,
@@ -139,6 +142,7 @@ impl<F: Distances> FloorLocalizer<F> {
     pub fn update(&mut self, odometry: Pose, ranges: &[f32], geometry: &Geometry) -> Outcome {
         let moved = self.moved(odometry);
         self.predict(odometry, moved);
+        self.is_moving = moved != Pose::default();
         let digest = digest(ranges);
         if let Some((before, first)) = self.last
             && before == digest
@@ -263,12 +267,22 @@ impl<F: Distances> FloorLocalizer<F> {
             Err(NoMatch::NothingNear) => return self.misfit(),
         };
         self.inliers = found.inliers;
-        let least = if self.is_confirmed { self.params.inliers_least } else { self.params.inliers_sure };
-        if found.inliers < least || !self.belief.correct(found.pose, &found.information, self.params.gate) {
+        if !self.fits(&found) || !self.belief.correct(found.pose, &found.information, self.params.gate) {
             return self.misfit();
         }
         (self.misses, self.hidden, self.is_confirmed) = (0, 0, true);
         Outcome::Fixed
+    }
+
+    /// Whether enough of the scan lies on the plan: less where the rest is only hidden, by things that the plan does not show.
+    fn fits(&self, found: &Match) -> bool {
+        let FloorParams { inliers_least, inliers_sure, inliers_hidden, through_hidden, .. } = self.params;
+        if !self.is_confirmed {
+            return found.inliers >= inliers_sure;
+        }
+        found.inliers >= inliers_least
+            || found.inliers >= inliers_hidden
+                && came_through(&self.floor, &self.scan, found.pose, SLACK) <= through_hidden
     }
 
     /// What does not fit: since something hides what the plan shows, or since the robot is not where it should be.
@@ -280,7 +294,8 @@ impl<F: Distances> FloorLocalizer<F> {
             && self.hidden < hidden_most
             && came_through(&self.floor, &self.scan, self.belief.pose, slack) <= through_most
         {
-            self.hidden += 1;
+            // One that stands still gets nowhere by what it does not see.
+            self.hidden += u32::from(self.is_moving);
             self.is_fixed = false;
             return Outcome::Hidden;
         }

@@ -47,6 +47,58 @@ fn with_a_laser_that_is_off_or_stuck_or_tells_nonsense_it_stands_and_says_that_i
 }
 
 #[test]
+fn behind_a_latch_a_task_ends_and_to_reset_it_moves_nothing() {
+    for mode in ["goto", "goto+avoid", "path"] {
+        let go = format!("call navigation.go x=8 y=2 mode={mode}");
+        for (name, requests) in [
+            ("before", [(1, go.as_str()), (3, "stop"), (10, "reset")]),
+            ("behind", [(1, "stop"), (3, go.as_str()), (10, "reset")]),
+        ] {
+            let summary = asked(&format!("{name}-{mode}"), &requests, 40);
+            assert_eq!(
+                ended(&summary, 1).last.progress,
+                Progress::Halted,
+                "{name} {mode}: {:?}",
+                summary.tasks
+            );
+            // Two seconds on the way at 0.3 m/s, or none.
+            let most = if name == "before" { 0.7 } else { 0.001 };
+            assert!(way(&summary) < most, "{name} {mode}: {} m", way(&summary));
+        }
+    }
+    let requests = [(1, "stop"), (10, "reset"), (12, "call navigation.go x=4 y=2 mode=goto")];
+    ends(&asked("after-reset", &requests, 40), 1, Progress::Arrived);
+}
+
+#[test]
+fn without_its_emergency_stop_it_drives_nowhere_whoever_commands() {
+    // Straight at the crate.
+    let requests = [
+        (1, "call navigation.go x=4 y=5.2 turned=true heading=0 mode=goto+avoid"),
+        (30, "call navigation.go x=9.5 y=5.2 mode=goto"),
+        (31, "fault stop off"),
+    ];
+    let summary = asked("no-stop", &requests, 60);
+    nothing_touched(&summary);
+    assert_ne!(ended(&summary, 2).last.progress, Progress::Arrived);
+    let by_hand = [(1, "remove stop"), (3, "call hand.drive linear=0.3 seconds=2")];
+    let summary = asked("no-stop-by-hand", &by_hand, 10);
+    assert!(way(&summary) < 0.001, "{} m", way(&summary));
+}
+
+#[test]
+fn a_wall_that_is_put_up_before_it_stops_it_and_it_still_knows_where_it_is() {
+    let wall = "call world.add name=wall x=7 y=2 length=0.2 width=2";
+    let around = "call navigation.go x=9 y=2 mode=path";
+    let requests = [(1, "call navigation.go x=9 y=2 mode=goto"), (3, wall), (120, around)];
+    let summary = asked("wall-before-it", &requests, 200);
+    ends(&summary, 1, Progress::Unreachable);
+    let off = ends(&summary, 2, Progress::Arrived).off.unwrap();
+    assert!(off < 0.05, "{off} m off");
+    nothing_touched(&summary);
+}
+
+#[test]
 fn a_goal_inside_an_obstacle_cannot_be_reached_whichever_way_it_goes() {
     for mode in ["goto", "path", "goto+avoid"] {
         let go = format!("call navigation.go x=6 y=5.2 seconds=90 mode={mode}");

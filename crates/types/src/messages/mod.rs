@@ -36,6 +36,6 @@ pub use pose::{FrameTransform, Odometry, Transforms};
 pub use ranges::{DIRECTIONS, Echo, Echoes, LaserScan, Ranges, Risk};
 pub use reasons::{Held, MOST_REASONS, MOST_SITUATIONS, Reason, Reasons, Signal};
 pub use sighting::Sighting;
-pub use stop::{EmergencyStop, StopKind};
+pub use stop::{EmergencyStop, Latch, StopKind};
 pub use task::{Answer, Goal, Halt, Manoeuvre, Motion, Progress, Report, Task, WallWish};
 pub use world::{WorldAnswer, WorldName, WorldPlace, WorldPush, WorldSlip, WorldThing};

@@ -29,7 +29,13 @@ pub struct FloorParams {
     /// The share of beams that may have come through what the plan shows for a scan that does not fit to be one of which people hide the rest: dead
     /// reckoning goes on. 0.1: in a wrong place of a room a third of the beams are too long.
     pub through_most: f64,
-    /// So many scans in a row may be hidden before it is searched for. 400: twenty seconds of a laser at 20 Hz; nobody stands around a robot for ever.
+    /// Where no more than the share [`through_hidden`](FloorParams::through_hidden) has come through what the plan shows, so many points are enough: what
+    /// is left is hidden by things that the plan does not show. 0.2: of a wall that was put up close before the robot two beams of three end on it.
+    pub inliers_hidden: f64,
+    /// See there. 0.03.
+    pub through_hidden: f64,
+    /// So many scans in a row may be hidden, while it is under way, before it is searched for. 400: twenty seconds of a laser at 20 Hz; nobody walks
+    /// around a robot for ever.
     pub hidden_most: u32,
     /// Deviations of the place (m) and the heading (rad) above which it is not known any more. 0.4 m and 0.35 rad: from nearer a scan finds back by itself.
     pub lost: (f64, f64),
@@ -65,6 +71,8 @@ impl Default for FloorParams {
             gate: 25.0,
             misses: 3,
             through_most: 0.1,
+            inliers_hidden: 0.2,
+            through_hidden: 0.03,
             hidden_most: 400,
             lost: (0.4, 0.35),
             still: (0.005, 0.01),

@@ -108,12 +108,12 @@ fn one_that_is_carried_elsewhere_is_lost_in_three_scans_and_found_again() {
     assert!(found * 10 >= 9 * (SEEDS / 2), "{found} of {}", SEEDS / 2);
 }
 
-/// What a laser sees when people stand close around it: of four beams three end at them.
+/// What a laser sees when people stand close around it: of eight beams seven end at them.
 fn among_people(roamer: &Roamer, number: u64) -> Vec<f32> {
     let draw = Stream::new(7, "people").sample(number);
     let hide = |(i, range): (usize, f32)| {
         let person = draw.between(i as u64 / 12, 0.4, 0.9) as f32;
-        if i / 12 % 4 == 0 { range } else { range.min(person + 0.001 * (i % 12) as f32) }
+        if i / 12 % 8 == 0 { range } else { range.min(person + 0.001 * (i % 12) as f32) }
     };
     roamer.look().into_iter().enumerate().map(hide).collect()
 }
@@ -139,11 +139,36 @@ fn people_who_hide_the_floor_do_not_lose_it_but_being_carried_away_among_them_do
         }
         assert!(hidden > 20, "seed {seed}: {hidden}");
         roamer.pose = anywhere(&floor, 50 + seed);
-        let noticed = (0..400).find(|scan| {
+        let noticed = (0..500).find(|scan| {
+            roamer.go();
             let _ = localizer.update(roamer.odometry, &among_people(&roamer, 1000 + scan), &roamer.geometry);
             localizer.pose().is_none()
         });
         assert!(noticed.is_some(), "seed {seed}");
+    }
+}
+
+#[test]
+fn a_wall_that_was_put_up_close_before_it_hides_most_and_it_still_knows_where_it_is() {
+    let floor = floor();
+    for seed in 0..SEEDS / 2 {
+        let mut roamer = Roamer::new(&floor, anywhere(&floor, seed), seed);
+        let mut localizer = lost(&floor, seed);
+        put(&mut localizer, &roamer, roamer.pose);
+        (0..10).for_each(|_| assert_eq!(go(&mut localizer, &mut roamer), Outcome::Fixed));
+        let geometry = roamer.geometry;
+        for scan in 0..1000 {
+            // It stands, and the noise of its laser makes each scan another one.
+            let wall = |(i, range): (usize, f32)| {
+                let angle = geometry.angle_min + geometry.angle_step * i as f64;
+                let hidden = 0.7 / libm::cos(angle);
+                if angle.abs() < 1.1 { range.min(hidden as f32 + 1e-4 * (scan % 7) as f32) } else { range }
+            };
+            let ranges: Vec<f32> = roamer.look().into_iter().enumerate().map(wall).collect();
+            let outcome = localizer.update(roamer.odometry, &ranges, &geometry);
+            assert_eq!(localizer.state(), State::Tracking, "seed {seed} {scan}: {outcome:?}");
+            assert!(off(&localizer, &roamer) < 0.05, "seed {seed} {scan}: {}", off(&localizer, &roamer));
+        }
     }
 }
 
