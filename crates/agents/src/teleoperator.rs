@@ -47,6 +47,17 @@ pub struct Teleoperator {
 /// While people drive that is told again so often: who hears it may have been started anew.
 const TELL_AGAIN: Duration = Duration::secs(1);
 
+impl TeleoperatorParams {
+    /// What is answered to an order.
+    fn said(&self, asked: &Manoeuvre) -> &'static str {
+        if Duration::from_seconds(asked.seconds) > self.longest {
+            "by hand, but for no longer than its parameter \"longest\": say it again and again"
+        } else {
+            "by hand"
+        }
+    }
+}
+
 impl Agent for Teleoperator {
     fn step(&mut self, step: &mut Step) -> Result<(), Fault> {
         let now = step.now;
@@ -56,7 +67,7 @@ impl Agent for Teleoperator {
                 self.orders.send(order);
             }
             let answer = match made {
-                Ok(_) => Answer { accepted: true, task: 0, why: "by hand".into() },
+                Ok(_) => Answer { accepted: true, task: 0, why: self.params.said(&asked).into() },
                 Err(why) => Answer { why: why.into(), ..Answer::default() },
             };
             self.drive.answer(&call, answer);
@@ -155,6 +166,8 @@ mod tests {
     fn who_lets_go_is_not_waited_for_and_no_order_holds_for_long() {
         let (params, mut grip) = (TeleoperatorParams::default(), Grip::default());
         let long = Manoeuvre { angular: 0.5, seconds: 60.0, ..Manoeuvre::default() };
+        assert!(params.said(&long).contains("\"longest\""));
+        assert_eq!(params.said(&Manoeuvre { seconds: 2.0, ..long }), "by hand");
         assert_eq!(grip.order(&params, &long, at(0)).map(|order| order.valid_until), Ok(at(2000)));
         assert_eq!(grip.news(&params, at(0)), Some(ByHand { on: true }));
         let over = grip.release(at(100)).unwrap();

@@ -105,7 +105,7 @@ impl Commands {
     }
 
     fn request(&self, request: Request) -> Result<(), Refusal> {
-        self.hooks.asks(&request);
+        self.hooks.asks(&request)?;
         self.control.request(request)
     }
 
@@ -154,7 +154,7 @@ impl Commands {
         let question = message_of("call", &rest, message)?;
         let question = self.hooks.encode(&shape.question, &question).map_err(Refusal::new)?;
         let service = service.to_owned();
-        self.hooks.asks(&Request::Call { service: service.clone(), cdr: question.clone(), within });
+        self.hooks.asks(&Request::Call { service: service.clone(), cdr: question.clone(), within })?;
         let answer = self.control.call(&service, question, within)?;
         self.hooks.decode(&shape.answer, &answer).map_err(Refusal::new)
     }

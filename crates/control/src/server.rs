@@ -37,9 +37,13 @@ use crate::words::Usage;
 ///
 /// It is called from one thread for each client, several at once.
 pub trait Hooks: Send + Sync + 'static {
-    /// A request is on its way to the system. It may still be refused.
-    fn asks(&self, request: &Request) {
+    /// A request is on its way to the system, which may still refuse it.
+    ///
+    /// # Errors
+    /// When it asks for what the system cannot know to be wrong; it does not reach it then.
+    fn asks(&self, request: &Request) -> Result<(), Refusal> {
         let _ = request;
+        Ok(())
     }
 
     /// Sets the emergency stop; `why` is what the person said, and may be empty.

@@ -112,6 +112,9 @@ pub(crate) struct RunArgs {
     /// Where the log goes; else DIR/run.mcap.
     #[arg(long, value_name = "F.mcap", conflicts_with = "no_log")]
     pub(crate) log: Option<PathBuf>,
+    /// Leaves out what the file asks for while it runs, its goal and its figures of that: all is asked for by you, as with sinew call.
+    #[arg(long)]
+    pub(crate) no_script: bool,
     /// Runs once, where the file has several runs to be compared.
     #[arg(long)]
     pub(crate) alone: bool,
@@ -265,6 +268,16 @@ pub(crate) fn typed(words: &[&str]) -> Result<ExitCode, Failure> {
     let line = Line::try_parse_from(["sinew"].iter().chain(words));
     let line = line.map_err(|error| Failure::new(error.to_string()))?;
     done(line.command, agents::registry(), line.json)
+}
+
+/// What is typed behind `sinew`, beginning with "run", as a run is told it.
+#[cfg(test)]
+pub(crate) fn run_args(words: &[&str]) -> RunArgs {
+    let line = Line::try_parse_from(["sinew"].iter().chain(words)).unwrap_or_else(|error| panic!("{error}"));
+    match line.command {
+        Command::Run(args) => *args,
+        _ => panic!("{words:?} is no run"),
+    }
 }
 
 /// Help and versions are answers; everything else is wrong usage.

@@ -210,6 +210,10 @@ fn misses(agent: &Resident) -> u64 {
 
 /// What is to be set of an agent, where it is otherwise than it shall be.
 fn given(agent: &Resident, setting: &Setting, overhead: Duration) -> Option<Given> {
+    if agent.is_robot || agent.nominal.giving.is_rigid {
+        // What people ask of it holds.
+        return None;
+    }
     let nanos = |time: schedule::Exact| Duration(time.to_integer() as i64);
     let nominal = &agent.nominal;
     let is_periodic = nominal.period.is_some();

@@ -2,16 +2,16 @@
 
 use agents::DecisionMaker;
 use agents::decision_maker::{DecisionTable, SETTINGS, Situation};
-use runtime::Declare as _;
+use runtime::{AgentPlan, Declare as _, Registry};
 use types::value::{Entry, Mistake, Row, Span, Table, Value};
 
-use super::read::Reader;
+use super::read::{Reader, unknown};
 use super::{Mistakes, Sources, set, tree};
 
 /// The type of the agent to which the section belongs.
-pub(super) const KIND: &str = DecisionMaker::KIND;
+pub(crate) const KIND: &str = DecisionMaker::KIND;
 /// Its parameter.
-pub(super) const PARAM: &str = "table";
+pub(crate) const PARAM: &str = "table";
 
 /// Reads the section into the parameters of the decision maker.
 pub(super) fn read(reader: &mut Reader<'_>, tree: &Table) {
@@ -47,12 +47,41 @@ pub(super) fn read(reader: &mut Reader<'_>, tree: &Table) {
     reader.mistakes.extend(DecisionTable::mistakes(&joined, None));
 }
 
-/// Whoever is named must be there.
+/// Whoever is named must be there, and be able to do what it is told.
 fn agents(reader: &mut Reader<'_>, table: &Table) {
-    for agent in DecisionTable::agents(table).filter(|agent| reader.plan.agent(&agent.key).is_none()) {
-        let mistake = reader.no_agent(&agent.key, agent.key_at);
-        reader.mistakes.push(mistake);
+    for row in DecisionTable::agents(table) {
+        let mistake = match reader.plan.agent(&row.key) {
+            None => Some(reader.no_agent(&row.key, row.key_at)),
+            Some(agent) => no_method(agent, reader.registry, row),
+        };
+        reader.mistakes.extend(mistake);
     }
+}
+
+/// What a table says of agents that are not in a running system, or of methods that they have not.
+pub(crate) fn strangers(agents: &[AgentPlan], registry: &Registry, table: &Table) -> Vec<Mistake> {
+    let wrong = |row: &Row| match agents.iter().find(|agent| agent.name == row.key) {
+        None => {
+            let what = format!("there is no agent \"{}\"", row.key);
+            Some(unknown(row.key_at, what, &row.key, agents.iter().map(|agent| agent.name.as_str())))
+        }
+        Some(agent) => no_method(agent, registry, row),
+    };
+    DecisionTable::agents(table).filter_map(wrong).collect()
+}
+
+/// The method that a row gives an agent, where it has none of that name.
+fn no_method(agent: &AgentPlan, registry: &Registry, row: &Row) -> Option<Mistake> {
+    let entry = row.entry.value.as_table()?.get("method")?;
+    let (method, kind) = (entry.value.as_text()?, registry.get(&agent.kind)?);
+    if kind.methods.iter().any(|known| known.name == method) {
+        return None;
+    }
+    let what = format!("agent \"{}\" has no method \"{method}\"", agent.name);
+    if kind.methods.is_empty() {
+        return Some(Mistake::new(entry.at, what).help("it has one way to work: leave the method out"));
+    }
+    Some(unknown(entry.at, what, method, kind.methods.iter().map(|known| known.name)))
 }
 
 /// Reads a table that stands by itself: the rows of a file, or of its section `[decide]`, else those of `base`; then the
@@ -111,4 +140,36 @@ fn is_row(key: &str, deeper: &Row) -> bool {
     let Some(table) = deeper.entry.value.as_table() else { return false };
     let has = |keys: &[&str]| table.rows().iter().any(|row| keys.contains(&row.key.as_str()));
     has(&["when"]) || Situation::named(&joined(key, deeper)).is_some() || !has(&SETTINGS)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn agents_that_are_not_there_and_methods_that_they_have_not_are_told_with_the_right_ones() {
+        let registry = crate::run::with_robots(::agents::registry());
+        let agents = crate::file::load("overload", &[], &registry).unwrap().plan.agents;
+        let said = |agent: &str, method: &str| {
+            let nested = |key: &str, value: Value| {
+                let mut table = Table::new();
+                table.set(key, value);
+                Value::Table(table)
+            };
+            let row = nested(agent, nested("method", Value::Text(method.to_owned())));
+            let Value::Table(table) = nested("free", row) else { unreachable!("it is one") };
+            let told = |mistake: Mistake| format!("{}; {}", mistake.what, mistake.help.unwrap_or_default());
+            strangers(&agents, &registry, &table).into_iter().map(told).collect::<Vec<_>>()
+        };
+        assert_eq!(said("track", "rough"), [""; 0]);
+        assert_eq!(said("trak", "rough"), ["there is no agent \"trak\"; did you mean \"track\"?"]);
+        assert_eq!(
+            said("track", "ruogh"),
+            ["agent \"track\" has no method \"ruogh\"; did you mean \"rough\"?"]
+        );
+        assert_eq!(
+            said("planner", "fast"),
+            ["agent \"planner\" has no method \"fast\"; it has one way to work: leave the method out"]
+        );
+    }
 }

@@ -19,7 +19,7 @@ mod agent;
 mod burden;
 pub(crate) mod calls;
 mod compare;
-mod decide;
+pub(crate) mod decide;
 mod figure;
 mod floor;
 mod group;

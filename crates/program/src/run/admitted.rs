@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use super::{One, options, with_robots};
-use crate::cli::{ClockChoice, RunArgs, typed};
+use crate::cli::{ClockChoice, RunArgs, run_args, typed};
 use crate::error::{Failure, Paint};
 
 /// 3 of 10 above 10 of 40: by hand 3 and 16 on one processor.
@@ -25,13 +25,7 @@ executor = \"control\"
 const THIRD: [&str; 6] = ["third", "is", "wall-follower", "period=8ms", "cost=4ms", "executor=receive"];
 
 fn args(file: &str) -> RunArgs {
-    #[derive(clap::Parser)]
-    struct Line {
-        #[command(flatten)]
-        run: RunArgs,
-    }
-    let words = ["run", file, "--for", "10000h", "--processors", "1", "--no-log"];
-    <Line as clap::Parser>::try_parse_from(words).unwrap().run
+    run_args(&["run", file, "--for", "10000h", "--processors", "1", "--no-log"])
 }
 
 #[test]

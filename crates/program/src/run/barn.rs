@@ -366,13 +366,7 @@ mod tests {
     }
 
     fn args(words: &[&str]) -> RunArgs {
-        #[derive(clap::Parser)]
-        struct Line {
-            #[command(flatten)]
-            run: RunArgs,
-        }
-        let line: Line = clap::Parser::parse_from([&["run"], words].concat());
-        line.run
+        crate::cli::run_args(&[&["run"], words].concat())
     }
 
     #[test]

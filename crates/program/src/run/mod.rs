@@ -18,6 +18,7 @@ mod judge;
 mod knowing;
 mod many;
 mod options;
+mod place;
 mod prepare;
 mod recorder;
 mod screen;
@@ -32,7 +33,6 @@ mod trial;
 mod trouble;
 mod useful;
 
-use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 use std::sync::atomic::AtomicBool;
 use std::sync::{Arc, PoisonError};
@@ -51,6 +51,7 @@ use crate::{figures, file, terminal};
 use asked::Repeat;
 use burden::Burdens;
 use knowing::Knowing;
+use place::Place;
 
 pub(crate) use asked::Asked;
 pub(crate) use burden::{BurdenArgs, burden};
@@ -131,45 +132,6 @@ pub(crate) fn run(args: &RunArgs, registry: Registry, json: bool) -> Result<Exit
 pub(crate) fn with_robots(mut registry: Registry) -> Registry {
     registry.extend([Berth::default().agent_type("robot")]);
     registry
-}
-
-/// Where the files of a run go.
-#[derive(Clone, Debug)]
-pub(crate) struct Place {
-    /// The folder.
-    folder: PathBuf,
-    /// The log; nothing when there shall be none.
-    log: Option<PathBuf>,
-}
-
-impl Place {
-    fn of(args: &RunArgs, name: &str, seed: u64) -> Result<Option<Place>, Failure> {
-        if args.no_log && args.out.is_none() {
-            return Ok(None);
-        }
-        let again = if args.repeat.is_some() { "-repeated" } else { "" };
-        let usual = || Path::new("out").join(format!("{name}-seed{seed}{again}"));
-        let place = Place::in_folder(args.out.clone().unwrap_or_else(usual), args)?;
-        if let (Some(before), Some(log)) = (&args.repeat, &place.log)
-            && before.canonicalize().is_ok_and(|before| log.canonicalize().is_ok_and(|log| log == before))
-        {
-            return Err(Failure::new(format!(
-                "{} would be written over while it is repeated",
-                log.display()
-            ))
-            .help("--out names another folder, --log another file"));
-        }
-        Ok(Some(place))
-    }
-
-    fn in_folder(folder: PathBuf, args: &RunArgs) -> Result<Place, Failure> {
-        std::fs::create_dir_all(&folder).map_err(|error| {
-            Failure::new(format!("the folder {} cannot be made: {error}", folder.display()))
-                .help("--out names another one, --no-log writes nothing")
-        })?;
-        let log = (!args.no_log).then(|| args.log.clone().unwrap_or_else(|| folder.join("run.mcap")));
-        Ok(Place { folder, log })
-    }
 }
 
 /// One run of a scenario.
@@ -427,14 +389,14 @@ mod tests {
     use types::messages::Transforms;
 
     /// Ten seconds of the scenario with a log; gives the log's bytes.
-    fn log_of(seed: u64, folder: &Path) -> Vec<u8> {
+    fn log_of(seed: u64, folder: &std::path::Path) -> Vec<u8> {
         let path = folder.join(format!("{seed}.mcap"));
         log_to(&path, seed, &[], Duration::secs(10));
         std::fs::read(path).unwrap()
     }
 
     /// Runs the exploration as long as that, with these settings, and logs it.
-    fn log_to(path: &Path, seed: u64, sets: &[String], limit: Duration) {
+    fn log_to(path: &std::path::Path, seed: u64, sets: &[String], limit: Duration) {
         let registry = with_robots(agents::registry());
         let scenario = Scenario { file: file::load("exploration", sets, &registry).unwrap(), registry };
         let ready = scenario.prepare(seed).unwrap();
@@ -454,13 +416,8 @@ mod tests {
 
     /// Runs the exploration with this asked in `[[at]]`, and gives its summary.
     fn summary_of(at: Duration, asked: &str, limit: Duration, give_up: Option<Duration>) -> Summary {
-        #[derive(clap::Parser)]
-        struct Line {
-            #[command(flatten)]
-            run: RunArgs,
-        }
-        let line: Line = clap::Parser::parse_from(["run", "exploration", "--no-log"]);
-        let args = RunArgs { limit: Some(limit), give_up, ..line.run };
+        let told = crate::cli::run_args(&["run", "exploration", "--no-log"]);
+        let args = RunArgs { limit: Some(limit), give_up, ..told };
         let mut scenario = options::scenario(&args, with_robots(agents::registry())).unwrap();
         let words = control::words::split(asked).unwrap();
         scenario.file.plan.requests = vec![TimedRequest { at, words, place: Default::default() }];

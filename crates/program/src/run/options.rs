@@ -19,6 +19,12 @@ pub(super) fn scenario(args: &RunArgs, registry: Registry) -> Result<Scenario, F
     let sets = [barn::sets(args), knowing::sets(args)].concat();
     let mut loaded = file::load(&args.system, &sets, &registry)?;
     loaded.store = args.know.clone().or(loaded.store);
+    if args.no_script {
+        loaded.plan.requests.clear();
+        for section in ["goal", "figure"] {
+            loaded.plan.sections.remove(section);
+        }
+    }
     if let Some(from) = &args.from {
         let (driver, folder) = recording(from)?;
         let robots = loaded.plan.section("robot").map(|robots| robots.rows()).unwrap_or_default();
@@ -135,6 +141,18 @@ pub(super) fn clock(args: &RunArgs, ready: &Ready) -> Result<ClockChoice, Failur
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn without_its_script_a_file_asks_for_nothing_and_strives_for_nothing() {
+        let scripted = |more: &[&str]| {
+            let args = crate::cli::run_args(&[&["run", "reactive"], more].concat());
+            let plan = scenario(&args, crate::run::with_robots(agents::registry())).unwrap().file.plan;
+            (plan.requests.len(), plan.section("goal").is_some(), plan.sections.get("figure").is_some())
+        };
+        let (requests, goal, figures) = scripted(&[]);
+        assert!(requests > 10 && goal && figures);
+        assert_eq!(scripted(&["--no-script"]), (0, false, false));
+    }
 
     #[test]
     fn a_robot_of_another_name_is_wired_as_before() {

@@ -18,11 +18,12 @@ use types::Time;
 use types::definition::Definition;
 use types::message::Message as _;
 use types::messages::{Decision, Orders, Reasons};
-use types::value::Entry;
+use types::value::{Entry, Mistake, Table, Value};
 
 use super::asked::{Asked, Deed};
 use super::prepare::Ready;
 use crate::cli::ClockChoice;
+use crate::file::decide;
 use crate::live::why::{self, Changes};
 use crate::terminal;
 
@@ -154,14 +155,38 @@ impl RunHooks {
         Ok(Plan { agents, queues, wires, ..self.plan.clone() })
     }
 
+    /// A decision table names agents, and the decision maker does not know who there is.
+    fn judge_table(&self, maker: &str, table: &Table) -> Result<(), Refusal> {
+        let (agents, ..) = self.control.plan()?;
+        if !agents.iter().any(|agent| agent.name == maker && agent.kind == decide::KIND) {
+            return Ok(());
+        }
+        let mistakes = decide::strangers(&agents, &self.registry, table);
+        if mistakes.is_empty() {
+            return Ok(());
+        }
+        let told = |mistake: &Mistake| match &mistake.help {
+            Some(help) => format!("{}; {help}", mistake.what),
+            None => mistake.what.clone(),
+        };
+        let all: Vec<String> = mistakes.iter().map(told).collect();
+        Err(Refusal::new(all.join("; ")).help("the table that was in force stays"))
+    }
+
     fn robots(&self) -> Result<(), Refusal> {
         if self.latches.is_empty() { Err(Refusal::new("this system has no robot")) } else { Ok(()) }
     }
 }
 
 impl Hooks for RunHooks {
-    fn asks(&self, request: &Request) {
+    fn asks(&self, request: &Request) -> Result<(), Refusal> {
+        if let Request::Set { agent, key, value: Value::Table(table) } = request
+            && key == decide::PARAM
+        {
+            self.judge_table(agent, table)?;
+        }
         self.asked.asks(request);
+        Ok(())
     }
 
     fn stop(&self, why: &str) -> Result<(), Refusal> {

@@ -8,6 +8,7 @@ use types::{Duration, Pose};
 
 use super::summary::Summary;
 use super::{ClockChoice, One, Place, RunArgs, options, with_robots};
+use crate::cli::run_args;
 use crate::figures::{self, TaskOutcome, Told};
 
 /// What came of it.
@@ -38,14 +39,9 @@ pub(super) fn tried(name: &str, requests: &[(i64, &str)], seconds: i64) -> Trial
 
 /// Runs a scenario as the command line says it, with its own requests or with these.
 pub(super) fn run(name: &str, words: &[&str], requests: Option<Vec<TimedRequest>>, seconds: i64) -> Trial {
-    #[derive(clap::Parser)]
-    struct Line {
-        #[command(flatten)]
-        run: RunArgs,
-    }
     let folder = std::env::temp_dir().join(format!("sinew-trial-{}-{name}", std::process::id()));
-    let line: Line = clap::Parser::parse_from(["run"].iter().chain(words));
-    let args = RunArgs { limit: Some(Duration::secs(seconds)), ..line.run };
+    let told = run_args(&[&["run"], words].concat());
+    let args = RunArgs { limit: Some(Duration::secs(seconds)), ..told };
     let mut scenario = options::scenario(&args, with_robots(agents::registry())).unwrap();
     if let Some(requests) = requests {
         scenario.file.plan.requests = requests;

@@ -21,7 +21,7 @@ use types::{Duration, Time};
 use super::known::{Known, Taken};
 use super::watch::{Ended, Watch};
 use super::{Knowing, begin, firing};
-use crate::cli::{ClockChoice, RunArgs};
+use crate::cli::{ClockChoice, RunArgs, run_args};
 use crate::error::{Failure, Paint};
 use crate::run::asked::{Asked, Repeat};
 use crate::run::prepare::Scenario;
@@ -98,15 +98,8 @@ impl Home {
     }
 
     fn args(&self, more: &[&str]) -> RunArgs {
-        #[derive(clap::Parser)]
-        struct Line {
-            #[command(flatten)]
-            run: RunArgs,
-        }
         let system = self.0.join("small.toml").display().to_string();
-        let words = ["run", &system].into_iter().chain(more.iter().copied());
-        let line: Line = clap::Parser::try_parse_from(words).unwrap();
-        line.run
+        run_args(&[&["run", &system], more].concat())
     }
 
     fn begun(&self, more: &[&str]) -> Result<(Scenario, Knowing, Told), Failure> {
