@@ -3,8 +3,9 @@
 use motion::kinematics::Differential;
 use motion::limits::Limits;
 use runtime::Input;
+use types::geometry::wrap;
 use types::messages::{Mode, Odometry, Offer, Report, Task, Twist};
-use types::{Duration, Point, Pose, Time};
+use types::{Duration, Point, Pose, Text, Time};
 
 use crate::odometry::ODOM;
 
@@ -74,8 +75,80 @@ pub(crate) fn offer(twist: Twist, now: Time) -> Offer {
 }
 
 /// What an action that has nothing to do tells: that it is there.
-pub(crate) const NOTHING: Report =
-    Report { task: 0, progress: types::messages::Progress::Idle, distance: 0.0, angle: 0.0, seconds: 0.0 };
+pub(crate) const NOTHING: Report = Report {
+    task: 0,
+    progress: types::messages::Progress::Idle,
+    distance: 0.0,
+    angle: 0.0,
+    seconds: 0.0,
+    why: Text::EMPTY,
+};
+
+/// Why a task ends for which the robot cannot say where on the map it is.
+pub(crate) const NO_POSE: &str =
+    "the localizer gives no pose: the robot does not know where on the map it is";
+/// Why a task ends with which the robot does not get on.
+pub(crate) const HELD: &str =
+    "it wishes to drive and gets nowhere: something holds it, or its latch is set (then: sinew reset)";
+/// Why a task ends that takes too long.
+pub(crate) const TOO_LONG: &str = "it took longer than it may";
+
+/// A robot that is so far from where it was has got on (m, rad).
+const GOT_ON: (f64, f64) = (0.1, 0.3);
+
+/// Whether the robot gets on when it wishes to.
+#[derive(Clone, Copy, Debug, Default)]
+pub(crate) struct Held {
+    /// Where it was last that it got on, by the wheels.
+    at: Option<Pose>,
+    /// How long ago that is (s).
+    since: f64,
+}
+
+impl Held {
+    /// For how long it has wished to drive and got nowhere (s).
+    pub(crate) fn see(&mut self, odometry: Pose, wishes: bool, dt: f64) -> f64 {
+        let at = *self.at.get_or_insert(odometry);
+        let moved = at.position().distance(odometry.position()) > GOT_ON.0
+            || wrap(odometry.heading - at.heading).abs() > GOT_ON.1;
+        self.since = if moved || !wishes { 0.0 } else { self.since + dt };
+        if moved {
+            self.at = Some(odometry);
+        }
+        self.since
+    }
+}
+
+/// Within this of its heading a robot has it (rad). One degree.
+const ALIGNED: f64 = 0.0175;
+/// Turn rate for a radian that is left (1/s): it bears a lag of 0.2 s without swinging.
+const ALIGN_GAIN: f64 = 1.5;
+/// So long nothing must have been ordered before it counts as standing (s): some lags of the drive.
+const STILL: f64 = 0.3;
+
+/// The turn on the spot to the heading of a task, at the end of its way.
+#[derive(Clone, Copy, Debug, Default)]
+pub(crate) struct Aligning {
+    rate: f64,
+    still: f64,
+}
+
+impl Aligning {
+    /// The turn rate (rad/s) where so much is left to turn (rad), within the highest rate and its highest change; nothing once it is there and stands.
+    pub(crate) fn step(&mut self, left: f64, (rate, change): (f64, f64), dt: f64) -> Option<f64> {
+        let off = left.abs();
+        let wish = (ALIGN_GAIN * off).min(libm::sqrt(2.0 * change * off)).min(rate);
+        let wish = if off > ALIGNED { libm::copysign(wish, left) } else { 0.0 };
+        self.rate += (wish - self.rate).clamp(-change * dt, change * dt);
+        self.still = if self.rate == 0.0 { self.still + dt } else { 0.0 };
+        (off > ALIGNED || self.still < STILL).then_some(self.rate)
+    }
+}
+
+/// What is left to the heading of a task that asks for one, to the left (rad), where it leads to `target` and the robot is at `here`.
+pub(crate) fn turn_left(task: &Task, target: Pose, here: Pose) -> f64 {
+    if task.turned { wrap(target.heading - here.heading) } else { 0.0 }
+}
 
 /// Where the robot is, by its wheels and by a localizer.
 #[derive(Clone, Copy, Debug, Default)]
@@ -175,6 +248,29 @@ mod tests {
         assert!(duty.is_new(Some(&task), now) && !duty.is_new(Some(&task), now));
         assert!(duty.is_new(Some(&Task { number: 4, ..task }), now) && !duty.is_new(None, now));
         assert!(duty.is_new(Some(&task), now), "after a pause it begins again");
+    }
+
+    #[test]
+    fn who_turns_to_a_heading_stands_there_within_a_degree() {
+        for wanted in [-3.0, -0.5, 0.01, 1.0, 3.0] {
+            let (mut aligning, mut heading, mut steps, mut fastest) = (Aligning::default(), 0.0, 0, 0.0_f64);
+            while let Some(rate) = aligning.step(wrap(wanted - heading), (1.0, 3.0), 0.05) {
+                (heading, steps, fastest) = (heading + 0.05 * rate, steps + 1, fastest.max(rate.abs()));
+                assert!(steps < 400, "{wanted}: {heading}");
+            }
+            assert!((wanted - heading).abs() <= ALIGNED && fastest <= 1.0, "{wanted}: {heading}, {fastest}");
+        }
+    }
+
+    #[test]
+    fn who_wishes_to_drive_and_gets_nowhere_is_held() {
+        let mut held = Held::default();
+        let at = |x| Pose::new(x, 0.0, 0.0);
+        assert_eq!(held.see(at(0.0), true, 0.5), 0.5);
+        assert_eq!(held.see(at(0.05), true, 0.5), 1.0, "so little is the noise of wheels");
+        assert_eq!(held.see(at(0.2), true, 0.5), 0.0);
+        assert_eq!(held.see(at(0.2), false, 0.5), 0.0);
+        assert_eq!(held.see(at(0.2), true, 0.5), 0.5);
     }
 
     #[test]

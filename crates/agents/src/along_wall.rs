@@ -6,11 +6,11 @@
 use motion::wall::{self, Parameters, Side};
 use runtime::{Agent, Fault, Input, Output, Step};
 use types::geometry::PI;
-use types::messages::{Mode, Motion, Offer, Progress, Ranges, Report, Task, Twist};
+use types::messages::{Mode, Motion, Odometry, Offer, Progress, Ranges, Report, Task, Twist};
 use types::params::Params;
-use types::{Duration, Time};
+use types::{Duration, Pose, Time};
 
-use crate::action::{Duty, NOTHING, bounded, offer};
+use crate::action::{Duty, HELD, Held, NOTHING, bounded, offer};
 use crate::shared::ring;
 
 /// How the wall is followed.
@@ -31,6 +31,9 @@ pub struct AlongParams {
     /// How fast the speed grows (m/s²).
     #[param(default = 0.3, min = 0.01, max = 5.0)]
     pub growth: f64,
+    /// When it wishes to drive and gets nowhere for so long, or has no ranges, it gives up (time). 8 s: people who stand in the way go on.
+    #[param(default = Duration::secs(8), min = 0.5, max = 600.0)]
+    pub patience: Duration,
     /// With ranges older than this it stands (time). 600 ms is two missed readings of a sonar at 4 Hz.
     #[param(default = Duration::millis(600), min = 0.02, max = 10.0)]
     pub stale: Duration,
@@ -61,6 +64,8 @@ pub struct AlongWall {
     task: Input<Task>,
     /// What is around.
     ranges: Input<Ranges>,
+    /// Where the robot is by its wheels: without it nobody notices that it does not get on.
+    odometry: Input<Odometry>,
     /// How it wishes to drive.
     drive: Output<Offer>,
     /// How far it has come.
@@ -81,19 +86,20 @@ impl Agent for AlongWall {
         let task = self.duty.task(step.name_of(step.agent).unwrap_or_default().as_str());
         let task = task.filter(|task| task.motion == Motion::Wall);
         let (is_new, dt) = (self.duty.is_new(task.as_ref(), now), self.duty.dt(now));
+        if let Some(odometry) = self.odometry.latest() {
+            self.walk.here = Some(odometry.pose);
+        }
         if is_new {
-            self.walk.speed = 0.0;
+            self.walk = Walk { speed: 0.0, held: Held::default(), stuck: 0.0, ..self.walk };
         }
         let Some(task) = task else {
             self.report.send(NOTHING);
             return Ok(());
         };
         let seconds = self.duty.seconds(now);
-        let is_over = task.seconds > 0.0 && seconds >= task.seconds;
-        let twist = if is_over { Twist::ZERO } else { self.walk.advance(&self.params, &task, now, dt) };
-        let progress = if is_over { Progress::Arrived } else { Progress::Underway };
+        let (twist, report) = self.walk.walk(&self.params, &task, seconds, now, dt);
         self.drive.send(offer(twist, now));
-        self.report.send(Report { task: task.number, progress, seconds, ..Report::default() });
+        self.report.send(report);
         Ok(())
     }
 }
@@ -104,11 +110,51 @@ struct Walk {
     ranges: Ranges,
     heard: Option<Time>,
     speed: f64,
+    /// Where it is by its wheels.
+    here: Option<Pose>,
+    held: Held,
+    /// For how long it has not got on (s).
+    stuck: f64,
 }
 
+/// Who has not got on for so long at the end of the time (s) has not followed the wall to that end.
+const STUCK: f64 = 1.5;
+
 impl Walk {
+    /// What is to be driven, and what becomes of the task.
+    fn walk(
+        &mut self,
+        params: &AlongParams,
+        task: &Task,
+        seconds: f64,
+        now: Time,
+        dt: f64,
+    ) -> (Twist, Report) {
+        let is_over = task.seconds > 0.0 && seconds >= task.seconds;
+        let twist = if is_over { Twist::ZERO } else { self.advance(params, task, now, dt) };
+        let is_blind = self.is_blind(params, now);
+        if let Some(here) = self.here
+            && !is_over
+        {
+            self.stuck = self.held.see(here, is_blind || twist != Twist::ZERO, dt);
+        }
+        let why = if is_blind { "it hears no ranges" } else { HELD };
+        let (progress, why) = match is_over {
+            _ if self.stuck > params.patience.seconds() => (Progress::Unreachable, why),
+            true if self.stuck > STUCK => (Progress::Unreachable, why),
+            true => (Progress::Arrived, ""),
+            false => (Progress::Underway, ""),
+        };
+        let twist = if progress.is_over() { Twist::ZERO } else { twist };
+        (twist, Report { task: task.number, progress, seconds, why: why.into(), ..Report::default() })
+    }
+
+    fn is_blind(&self, params: &AlongParams, now: Time) -> bool {
+        self.heard.is_none_or(|heard| now - heard > params.stale)
+    }
+
     fn advance(&mut self, params: &AlongParams, task: &Task, now: Time, dt: f64) -> Twist {
-        if self.heard.is_none_or(|heard| now - heard > params.stale) {
+        if self.is_blind(params, now) {
             self.speed = 0.0;
             return Twist::ZERO;
         }
@@ -124,7 +170,6 @@ impl Walk {
 mod tests {
     use super::*;
     use crate::shared::blank;
-    use types::Pose;
 
     /// What a ring of 16 exact beams hears at `pose` in a room of 8 m by 6 m with its corner at the origin.
     fn heard(pose: Pose) -> Ranges {
@@ -169,6 +214,31 @@ mod tests {
             // More than once around, with the wall on the left clockwise.
             assert!(way > 25.0 && (turned < -6.0) == left && turned.abs() > 6.0, "{way} m, {turned} rad");
         }
+    }
+
+    #[test]
+    fn who_is_held_at_the_wall_has_not_arrived() {
+        let params = AlongParams::default();
+        let task = Task { number: 1, motion: Motion::Wall, seconds: 20.0, ..Task::default() };
+        let ends = |task: Task, moves: bool| {
+            let (mut walk, mut body) = (Walk::default(), Pose::new(4.0, 3.0, 0.0));
+            (0..2000).find_map(|i| {
+                let now = Time::ZERO + Duration::millis(20 * i);
+                (walk.ranges, walk.heard, walk.here) = (heard(body), Some(now), Some(body));
+                let (twist, report) = walk.walk(&params, &task, 0.02 * i as f64, now, 0.02);
+                if moves {
+                    body = body.advanced(twist.linear, twist.angular, 0.02);
+                }
+                report.progress.is_over().then_some(report)
+            })
+        };
+        let free = ends(task, true).unwrap();
+        assert!(free.progress == Progress::Arrived && free.why.is_empty(), "{free:?}");
+        let held = ends(task, false).unwrap();
+        assert!(held.progress == Progress::Unreachable && (8.0..8.1).contains(&held.seconds), "{held:?}");
+        assert!(held.why.as_str().contains("latch"), "{held:?}");
+        // Nor has who was held only at the end of a short time.
+        assert_eq!(ends(Task { seconds: 3.0, ..task }, false).unwrap().progress, Progress::Unreachable);
     }
 
     #[test]

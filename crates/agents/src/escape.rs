@@ -126,6 +126,7 @@ impl Agent for EscapeAction {
             distance: far.unwrap_or(0.0),
             angle: 0.0,
             seconds: self.duty.seconds(now),
+            why: "it does not come on, and no try to get out has helped".into(),
         };
         self.report.send(if out.escape.phase() == Phase::GivenUp { over } else { NOTHING });
         Ok(())

@@ -17,7 +17,7 @@ use types::params::Params;
 use types::value::{Mistake, Table, nearest};
 use types::{Duration, Pose, Text, Time};
 
-use crate::action::{Duty, NOTHING, Whereabouts, bounded, limits, offer};
+use crate::action::{Duty, NO_POSE, NOTHING, TOO_LONG, Whereabouts, bounded, limits, offer};
 
 /// The law, and what is good enough.
 #[derive(Clone, Debug, Params)]
@@ -170,6 +170,9 @@ impl Agent for GotoAction {
     }
 }
 
+const STUCK: &str =
+    "it comes no nearer: something is in its way or holds it, or its latch is set (then: sinew reset)";
+
 /// The way to one goal.
 #[derive(Clone, Copy, Debug, Default)]
 struct Going {
@@ -201,7 +204,7 @@ impl Going {
         let is_old = |at: Time| now - at > params.pose_age;
         let correction = if needs_pose { self.place.map_from_odometry } else { Some(Pose::default()) };
         let (Some(correction), Some((parameters, goal))) = (correction, self.wanted) else {
-            return (Twist::ZERO, Report { progress: Progress::Lost, ..report });
+            return (Twist::ZERO, Report { progress: Progress::Lost, why: NO_POSE.into(), ..report });
         };
         let goto = self
             .goto
@@ -212,16 +215,16 @@ impl Going {
         let gone = goto.step(odometry.pose, dt);
         let report = Report { distance: gone.distance, angle: gone.turn, ..report };
         if needs_pose && self.place.corrected.is_none_or(is_old) {
-            return (Twist::ZERO, Report { progress: Progress::Lost, ..report });
+            return (Twist::ZERO, Report { progress: Progress::Lost, why: NO_POSE.into(), ..report });
         }
-        let progress = match gone.phase {
-            Phase::Arrived => Progress::Arrived,
-            Phase::TimedOut => Progress::TimedOut,
-            Phase::Stuck => Progress::Unreachable,
-            Phase::Lost => Progress::Lost,
-            _ => Progress::Underway,
+        let (progress, why) = match gone.phase {
+            Phase::Arrived => (Progress::Arrived, ""),
+            Phase::TimedOut => (Progress::TimedOut, TOO_LONG),
+            Phase::Stuck => (Progress::Unreachable, STUCK),
+            Phase::Lost => (Progress::Lost, "the odometry tells no numbers"),
+            _ => (Progress::Underway, ""),
         };
-        (gone.twist, Report { progress, ..report })
+        (gone.twist, Report { progress, why: why.into(), ..report })
     }
 }
 

@@ -1,14 +1,17 @@
 //! Move: a velocity for a time, a distance, an angle, a place; by a profile, with the loop closed over the wheels.
 
 use motion::manoeuvre::{self, Manoeuvre, Move, Outcome};
-use motion::profile::Bounds;
+use motion::profile::{Bounds, Unfit};
 use runtime::{Agent, Fault, Input, Output, Step};
 use types::messages::{Mode, Motion, Odometry, Offer, Progress, Report, Task, Twist};
 use types::params::Params;
 use types::value::{Mistake, Table};
 use types::{Text, Time};
 
-use crate::action::{Duty, NOTHING, Whereabouts, bounded, offer};
+use crate::action::{Duty, NO_POSE, NOTHING, TOO_LONG, Whereabouts, bounded, offer};
+
+/// Why something ended.
+type Why = Text<127>;
 
 /// What a motion may do.
 #[derive(Clone, Debug, Params)]
@@ -20,6 +23,9 @@ pub struct MoveParams {
     /// Highest speed (m/s). 0.5 is a slow walk.
     #[param(default = 0.5, min = 0.01, max = 10.0)]
     pub linear_max: f64,
+    /// Highest speed backwards (m/s), as a positive number; no higher than that of the drive, or it falls behind its plan. 0.3: it sees less there.
+    #[param(default = 0.3, min = 0.01, max = 10.0)]
+    pub backward_max: f64,
     /// Acceleration (m/s²). 0.5 starts without slip on a smooth floor.
     #[param(default = 0.5, min = 0.01, max = 20.0)]
     pub acceleration: f64,
@@ -57,13 +63,43 @@ fn whole(params: &MoveParams, read: &Table) -> Vec<Mistake> {
 }
 
 impl MoveParams {
+    /// The parameter that says how fast a task may be, and what it says (m/s).
+    fn fastest(&self, task: &Task) -> (&'static str, f64) {
+        let is_backward = match task.motion {
+            Motion::Distance => task.distance < 0.0,
+            Motion::Velocity => task.linear < 0.0,
+            _ => false,
+        };
+        if is_backward && self.backward_max < self.linear_max {
+            ("backward_max", self.backward_max)
+        } else {
+            ("linear_max", self.linear_max)
+        }
+    }
+
+    /// Why a task has no plan.
+    fn unfit(&self, task: &Task, unfit: Unfit) -> Why {
+        let (name, fastest) = self.fastest(task);
+        match unfit {
+            Unfit::TooFast if task.linear.abs() > fastest => Text::format(format_args!(
+                "{} m/s is faster than the move action's {name} of {fastest} m/s",
+                task.linear
+            )),
+            Unfit::TooFast => Text::format(format_args!(
+                "{} rad/s is faster than the move action's angular_max of {} rad/s",
+                task.angular, self.angular_max
+            )),
+            _ => "no profile leads there: it is farther or finer than a plan can be".into(),
+        }
+    }
+
     fn parameters(&self, task: &Task) -> manoeuvre::Parameters {
         let jerk = |jerk: f64| if self.profile.as_str() == "trapezoid" { f64::INFINITY } else { jerk };
         // A timed velocity is driven as it is said: too fast a one is refused, not slowed.
         let asked = |speed: f64| if task.motion == Motion::Velocity { 0.0 } else { speed.abs() };
         manoeuvre::Parameters {
             linear: Bounds {
-                velocity: bounded(self.linear_max, asked(task.linear)),
+                velocity: bounded(self.fastest(task).1, asked(task.linear)),
                 acceleration: self.acceleration,
                 jerk: jerk(self.jerk),
             },
@@ -80,6 +116,9 @@ impl MoveParams {
         }
     }
 }
+
+const BLOCKED: &str =
+    "it fell behind its plan: something holds it, its wheels slip, or its latch is set (then: sinew reset)";
 
 /// Drives the manoeuvre of its task, and tells when it is done or something holds it.
 #[derive(Agent)]
@@ -102,7 +141,7 @@ pub struct MoveAction {
     duty: Duty,
     place: Whereabouts,
     /// What it drives, or why it cannot.
-    manoeuvre: Option<Result<Manoeuvre, Progress>>,
+    manoeuvre: Option<Result<Manoeuvre, (Progress, Why)>>,
     /// Odometry as one reading gave it: what is held to a plan must not be predicted from the plan's own commands.
     measured: Option<Odometry>,
 }
@@ -133,17 +172,18 @@ impl Agent for MoveAction {
     }
 }
 
-fn begin(params: &MoveParams, task: &Task, place: &Whereabouts) -> Result<Manoeuvre, Progress> {
+fn begin(params: &MoveParams, task: &Task, place: &Whereabouts) -> Result<Manoeuvre, (Progress, Why)> {
     let wanted = match task.motion {
         Motion::To => {
-            let target = place.target(task).ok_or(Progress::Lost)?;
+            let target = place.target(task).ok_or((Progress::Lost, NO_POSE.into()))?;
             Move::To { point: target.position(), heading: task.turned.then_some(target.heading) }
         }
         Motion::Distance => Move::Distance(task.distance),
         Motion::Turn => Move::Turn(task.angle),
         _ => Move::Velocity { twist: Twist::new(task.linear, task.angular), seconds: task.seconds },
     };
-    Manoeuvre::new(params.parameters(task), wanted).map_err(|_| Progress::Refused)
+    Manoeuvre::new(params.parameters(task), wanted)
+        .map_err(|unfit| (Progress::Refused, params.unfit(task, unfit)))
 }
 
 impl MoveAction {
@@ -152,22 +192,28 @@ impl MoveAction {
         let report = Report { task: task.number, progress: Progress::Underway, seconds, ..Report::default() };
         let manoeuvre = match &mut self.manoeuvre {
             Some(Ok(manoeuvre)) => manoeuvre,
-            Some(Err(why)) => return (Twist::ZERO, Report { progress: *why, ..report }),
+            Some(Err((progress, why))) => {
+                let (distance, angle) = (task.distance.abs(), task.angle);
+                return (Twist::ZERO, Report { progress: *progress, distance, angle, why: *why, ..report });
+            }
             None => return (Twist::ZERO, report),
         };
         let Some(measured) = self.measured else { return (Twist::ZERO, report) };
         let gone = manoeuvre.step(measured.pose, dt);
         let is_late = task.motion != Motion::Velocity && task.seconds > 0.0 && seconds > task.seconds;
-        let progress = match gone.outcome {
-            Outcome::Running if is_late => Progress::TimedOut,
-            Outcome::Running => Progress::Underway,
-            Outcome::Done => Progress::Arrived,
-            Outcome::Missed | Outcome::Blocked => Progress::Unreachable,
-            Outcome::Lost => Progress::Lost,
+        let (progress, why) = match gone.outcome {
+            Outcome::Running if is_late => (Progress::TimedOut, TOO_LONG),
+            Outcome::Running => (Progress::Underway, ""),
+            Outcome::Done => (Progress::Arrived, ""),
+            Outcome::Missed => {
+                (Progress::Unreachable, "its plan is over and the wheels have not come to its end")
+            }
+            Outcome::Blocked => (Progress::Unreachable, BLOCKED),
+            Outcome::Lost => (Progress::Lost, "the odometry tells no numbers"),
         };
         let twist = if progress == Progress::TimedOut { Twist::ZERO } else { gone.twist };
-        let distance = gone.error.position().norm();
-        (twist, Report { progress, distance, angle: gone.error.heading, ..report })
+        let (distance, angle) = (gone.distance, gone.angle);
+        (twist, Report { progress, distance, angle, why: why.into(), ..report })
     }
 }
 
@@ -251,7 +297,7 @@ mod tests {
         assert_eq!(how, Progress::Arrived);
         assert!((end.heading - 0.5f64.atan()).abs() < 0.02, "as it came: {end:?}");
         let unknown = begin(&MoveParams::default(), &task, &Whereabouts::default());
-        assert_eq!(unknown.err(), Some(Progress::Lost));
+        assert_eq!(unknown.err().map(|(progress, _)| progress), Some(Progress::Lost));
         let by_wheels = Task { frame: crate::odometry::ODOM.into(), ..task };
         assert!(begin(&MoveParams::default(), &by_wheels, &Whereabouts::default()).is_ok());
     }
@@ -265,8 +311,28 @@ mod tests {
         let mut agent = blank();
         agent.manoeuvre = Some(begin(&params, &task, &agent.place));
         agent.measured = Some(Odometry::default());
-        let held =
-            (0..500).map(|i| agent.advance(&task, 0.02, Time::ZERO + Duration::millis(20 * i)).1.progress);
-        assert_eq!(held.last(), Some(Progress::Unreachable));
+        let held = (0..500).map(|i| agent.advance(&task, 0.02, Time::ZERO + Duration::millis(20 * i)).1);
+        let last = held.last().unwrap();
+        assert!(last.progress == Progress::Unreachable && last.why.as_str().contains("latch"), "{last:?}");
+        assert_eq!(last.distance, 2.0, "all of it is left");
+    }
+
+    #[test]
+    fn too_fast_a_velocity_is_refused_with_the_limit() {
+        let params = MoveParams::default();
+        let task = Task { number: 1, motion: Motion::Velocity, seconds: 1.0, ..Task::default() };
+        let why = |task: Task| begin(&params, &task, &Whereabouts::default()).unwrap_err().1;
+        let told = why(Task { linear: 5.0, ..task });
+        assert_eq!(told.as_str(), "5 m/s is faster than the move action's linear_max of 0.5 m/s");
+        assert!(why(Task { linear: -0.4, ..task }).as_str().contains("backward_max of 0.3"));
+        assert!(why(Task { angular: 5.0, ..task }).as_str().contains("angular_max of 1 rad/s"));
+    }
+
+    #[test]
+    fn a_way_back_is_planned_no_faster_than_the_drive_goes_back() {
+        let task = Task { number: 1, motion: Motion::Distance, distance: -3.0, ..Task::default() };
+        let (end, how, fastest) = driven(&MoveParams::default(), task);
+        assert_eq!(how, Progress::Arrived);
+        assert!((end.x + 3.0).abs() < 0.006 && fastest < 0.3 * 1.2 + 1e-9, "{end:?}, {fastest} m/s");
     }
 }

@@ -13,7 +13,7 @@ use types::messages::{
 use types::params::Params;
 use types::{Duration, Point, Pose, Time};
 
-use crate::action::{Duty, NOTHING, Whereabouts};
+use crate::action::{Aligning, Duty, NO_POSE, NOTHING, TOO_LONG, Whereabouts, turn_left};
 use crate::odometry::ODOM;
 
 /// What the robot is, and where it shall go.
@@ -185,12 +185,19 @@ impl Agent for Navigator {
         if let Some(stop) = self.stop.latest() {
             self.helm.hear(&self.params, stop.allowed, step.now);
         }
-        let state = self.helm.step(&self.params, step.now);
-        let (twist, now) = (state.twist, step.now);
+        let mut state = self.helm.step(&self.params, step.now);
+        let (now, dt) = (step.now, self.duty.dt(step.now));
         if is_action {
             let seconds = self.duty.seconds(now);
-            self.report.send(task.map_or(NOTHING, |task| told(&task, &state, seconds)));
+            let target = task.and_then(|task| self.place.target(&task));
+            let here = self.helm.moves.map(|(pose, _)| pose);
+            let report = task.map_or(NOTHING, |task| {
+                let rest = self.helm.rest(&self.params, &task, (target, here), &mut state, dt);
+                told(&task, &state, rest, seconds)
+            });
+            self.report.send(report);
         }
+        let twist = state.twist;
         let drives = !matches!(state.doing, Doing::Idle | Doing::Blind);
         self.drive.send(Offer {
             twist,
@@ -208,15 +215,22 @@ impl Agent for Navigator {
     }
 }
 
-/// What becomes of a task.
-fn told(task: &Task, state: &Navigation, seconds: f64) -> Report {
-    let progress = match state.doing {
-        Doing::Arrived => Progress::Arrived,
-        Doing::GivenUp => Progress::Unreachable,
-        _ if task.seconds > 0.0 && seconds > task.seconds => Progress::TimedOut,
-        _ => Progress::Underway,
+/// What becomes of a task, of which so much is left (m, rad); nothing where nobody knows where the robot or its goal is.
+fn told(task: &Task, state: &Navigation, rest: Option<(f64, f64)>, seconds: f64) -> Report {
+    let is_late = task.seconds > 0.0 && seconds > task.seconds;
+    let (progress, why) = match state.doing {
+        Doing::Arrived => (Progress::Arrived, ""),
+        Doing::GivenUp => (Progress::Unreachable, "it was stuck, and no try got it out"),
+        Doing::Blind if is_late => {
+            (Progress::TimedOut, "it took longer than it may, and the laser tells nothing")
+        }
+        Doing::NoWay if is_late => (Progress::TimedOut, "it took longer than it may, and no way is open"),
+        _ if is_late && rest.is_none() => (Progress::TimedOut, NO_POSE),
+        _ if is_late => (Progress::TimedOut, TOO_LONG),
+        _ => (Progress::Underway, ""),
     };
-    Report { task: task.number, progress, distance: state.left, angle: 0.0, seconds }
+    let (distance, angle) = rest.unwrap_or_default();
+    Report { task: task.number, progress, distance, angle, seconds, why: why.into() }
 }
 
 /// A goal that a correction of the localizer moves by less than this stays where it is (m): another one is begun anew.
@@ -235,6 +249,8 @@ struct Helm {
     goal: Option<Point>,
     /// Since when a stop holds it back.
     held: Option<Time>,
+    /// The turn at the goal.
+    aligning: Aligning,
 }
 
 impl Helm {
@@ -246,6 +262,30 @@ impl Helm {
             return;
         }
         self.heard = Some(goal);
+        self.aligning = Aligning::default();
+    }
+
+    /// What is left of the way to the target and of the turn there (m, rad), by the pose of the robot, both in the frame of the wheels. At the place
+    /// it turns to the heading of its task, and has arrived when it has that.
+    fn rest(
+        &mut self,
+        params: &NavigatorParams,
+        task: &Task,
+        (target, here): (Option<Pose>, Option<Pose>),
+        state: &mut Navigation,
+        dt: f64,
+    ) -> Option<(f64, f64)> {
+        let (target, here) = (target?, here?);
+        let turn = turn_left(task, target, here);
+        if state.doing == Doing::Arrived && task.turned {
+            let limits = (params.angular_max, params.angular_acceleration);
+            if let Some(rate) = self.aligning.step(turn, limits, dt) {
+                (state.doing, state.twist) = (Doing::Turning, Twist::new(0.0, rate));
+            }
+        } else {
+            self.aligning = Aligning::default();
+        }
+        Some((here.position().distance(target.position()), turn))
     }
 
     /// Hears what speed a stop allows (m/s).
@@ -393,6 +433,30 @@ mod tests {
         // Two seconds of no progress are stuck; 60 s are waited before those.
         assert!(gets_out(f64::INFINITY).is_some_and(|tenth| (20..25).contains(&tenth)));
         assert!(gets_out(0.0).is_some_and(|tenth| (620..626).contains(&tenth)), "{:?}", gets_out(0.0));
+    }
+
+    #[test]
+    fn at_the_goal_it_turns_to_the_heading_that_was_asked_for_and_tells_what_is_left() {
+        let mut helm = helm();
+        let target = Pose::new(0.1, 0.0, 2.0);
+        let task = Task { number: 1, motion: Motion::Goto, target, turned: true, ..Task::default() };
+        let mut body = Pose::default();
+        let report = (0..400).find_map(|step| {
+            let now = at(f64::from(step) * 0.05);
+            helm.look(&scan(), &[8.0; 181], None, now);
+            helm.moves = Some((body, Twist::ZERO));
+            helm.aim(Some(target.position()), step == 0);
+            let mut state = helm.step(&params(), now);
+            assert_eq!(state.doing, Doing::Arrived, "0.2 m are near enough");
+            let rest = helm.rest(&params(), &task, (Some(target), Some(body)), &mut state, 0.05);
+            body = body.advanced(state.twist.linear, state.twist.angular, 0.05);
+            let report = told(&task, &state, rest, now.seconds());
+            report.progress.is_over().then_some(report)
+        });
+        let report = report.unwrap();
+        assert_eq!(report.progress, Progress::Arrived);
+        assert!((body.heading - 2.0).abs() < 0.02 && report.angle.abs() < 0.02, "{body:?}");
+        assert!((report.distance - 0.1).abs() < 1e-9, "the truth: {report:?}");
     }
 
     #[test]

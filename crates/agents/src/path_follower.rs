@@ -2,14 +2,15 @@
 
 use motion::track::{self, Mode as Following, Track};
 use runtime::{Agent, Fault, Input, Output, Step};
-use types::geometry::wrap;
 use types::messages::{
     Mode, Motion, Odometry, Offer, Path, Progress, Report, Safety, Task, Twist, WAYPOINTS,
 };
 use types::params::Params;
 use types::{Duration, Name, Point, Pose, Sequence};
 
-use crate::action::{Duty, NOTHING, Whereabouts, bounded, limits, offer};
+use crate::action::{
+    Aligning, Duty, HELD, Held, NO_POSE, NOTHING, TOO_LONG, Whereabouts, bounded, limits, offer, turn_left,
+};
 use crate::odometry::ODOM;
 use crate::shared::Dated;
 
@@ -110,7 +111,8 @@ impl Agent for PathFollower {
         let (is_new, dt) = (self.duty.is_new(task.as_ref(), now), self.duty.dt(now));
         if is_new {
             // A path to another goal leads elsewhere.
-            (self.way.course, self.way.got_on) = (None, None);
+            self.way.last_left = Default::default();
+            (self.way.course, self.way.held, self.way.aligning) = Default::default();
         }
         while let Some(path) = self.path.take() {
             if task.is_some() {
@@ -147,25 +149,13 @@ struct Way {
     clearance: Option<Dated<f64>>,
     course: Option<Course>,
     last: Twist,
-    /// Where it was last that it got on, by the wheels, and how long ago that is (s).
-    got_on: Option<(Pose, f64)>,
+    /// What was left of the way (m) and of the turn (rad).
+    last_left: (f64, f64),
+    held: Held,
+    aligning: Aligning,
 }
 
-/// A robot that is so far from where it was has got on (m, rad).
-const GOT_ON: (f64, f64) = (0.1, 0.3);
-
 impl Way {
-    /// For how long it has wished to drive and got nowhere (s).
-    fn held(&mut self, odometry: Pose, dt: f64) -> f64 {
-        let (at, since) = self.got_on.unwrap_or((odometry, 0.0));
-        let moved = at.position().distance(odometry.position()) > GOT_ON.0
-            || wrap(odometry.heading - at.heading).abs() > GOT_ON.1;
-        let wishes = self.last != Twist::ZERO;
-        let since = if moved || !wishes { 0.0 } else { since + dt };
-        self.got_on = Some((if moved { odometry } else { at }, since));
-        since
-    }
-
     fn change(&mut self, params: &FollowerParams, path: &Path, task: Option<&Task>) {
         let Some(task) = task else { return };
         if !path.found {
@@ -192,20 +182,22 @@ impl Way {
         }
     }
 
-    /// The goal of a task, in the frame of the path.
-    fn goal(&self, course: &Course, task: &Task) -> Point {
-        let goal = task.target.position();
+    /// Where a task leads, in the frame of the path.
+    fn target(&self, course: &Course, task: &Task) -> Pose {
         if course.frame == task.frame || task.frame.is_empty() {
-            return goal;
+            return task.target;
         }
-        self.place.map_from_odometry.map_or(goal, |map| map.inverse().transform(goal))
+        self.place.map_from_odometry.map_or(task.target, |map| map.inverse().then(task.target))
     }
 
     fn advance(&mut self, params: &FollowerParams, task: &Task, seconds: f64, dt: f64) -> (Twist, Report) {
         let report = Report { task: task.number, progress: Progress::Underway, seconds, ..Report::default() };
         if task.seconds > 0.0 && seconds > task.seconds {
             self.last = Twist::ZERO;
-            return (Twist::ZERO, Report { progress: Progress::TimedOut, ..report });
+            let (distance, angle) = self.last_left;
+            let report = Report { progress: Progress::TimedOut, distance, angle, ..report };
+            let why = if self.course.is_some() { TOO_LONG } else { "the planner has found no way in time" };
+            return (Twist::ZERO, Report { why: why.into(), ..report });
         }
         let clearance = self.clearance.map_or(f64::INFINITY, |near| near.value.max(0.0));
         let Some(mut course) = self.course else {
@@ -214,23 +206,31 @@ impl Way {
         };
         let Some(here) = self.here(&course) else {
             self.last = Twist::ZERO;
-            return (Twist::ZERO, Report { progress: Progress::Lost, ..report });
+            return (Twist::ZERO, Report { progress: Progress::Lost, why: NO_POSE.into(), ..report });
         };
         let gone = course.track.step(&course.points, &course.speeds, here, clearance, dt);
         self.course = Some(course);
-        self.last = gone.twist;
         let odometry = self.place.odometry.map_or(here, |odometry| odometry.pose);
-        let is_held = self.held(odometry, dt) > params.patience.seconds();
-        let left = here.position().distance(self.goal(&course, task));
-        let progress = match gone.mode {
+        let is_held = self.held.see(odometry, self.last != Twist::ZERO, dt) > params.patience.seconds();
+        let target = self.target(&course, task);
+        let (left, turn) = (here.position().distance(target.position()), turn_left(task, target, here));
+        self.last_left = (left, turn);
+        self.last = gone.twist;
+        let is_there = gone.mode == Following::Arrived && !course.cut && left <= params.goal_near;
+        let limits = (bounded(params.angular_max, task.angular), params.angular_acceleration);
+        let turning = if is_there && task.turned { self.aligning.step(turn, limits, dt) } else { None };
+        if let Some(rate) = turning {
+            self.last = Twist::new(0.0, rate);
+        }
+        let (progress, why) = match gone.mode {
             // A path that was cut goes on with the next.
-            Following::Arrived if course.cut => Progress::Underway,
-            Following::Arrived if left > params.goal_near => Progress::Unreachable,
-            Following::Arrived => Progress::Arrived,
-            _ if is_held => Progress::Unreachable,
-            _ => Progress::Underway,
+            Following::Arrived if course.cut => (Progress::Underway, ""),
+            Following::Arrived if !is_there => (Progress::Unreachable, "the path ends before the goal"),
+            Following::Arrived if turning.is_none() => (Progress::Arrived, ""),
+            _ if is_held => (Progress::Unreachable, HELD),
+            _ => (Progress::Underway, ""),
         };
-        (gone.twist, Report { progress, distance: left, ..report })
+        (self.last, Report { progress, distance: left, angle: turn, why: why.into(), ..report })
     }
 }
 

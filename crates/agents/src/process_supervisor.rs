@@ -15,12 +15,15 @@
 
 mod modes;
 
-use runtime::{Agent, AgentState, Composition, Fault, Input, Output, Router, Service, Step};
+use runtime::{
+    Agent, AgentState, Composition, Fault, Input, Member, MessageType, Output, Router, Service, Step,
+};
 use types::Name;
-use types::messages::{Answer, ByHand, Mode, Motion, Progress, Report, Task};
+use types::messages::{Answer, ByHand, Mode, Motion, Report, Task};
 use types::params::Params;
 use types::value::{Mistake, Table, nearest};
 
+use modes::Known;
 pub use modes::{IDLE, ModeTable, RESERVED};
 
 /// The modes.
@@ -108,16 +111,15 @@ impl Agent for ProcessSupervisor {
             }
         }
         while let Some(task) = self.tasks.take().map(|received| *received) {
-            if self.why_not(task.mode).is_none() {
+            let Some(why) = self.why_not(task.mode).or_else(|| self.nobody_does(&task)) else {
                 match self.waiting.is_some() {
                     true => self.wait(task),
                     false => self.begin(task),
                 }
                 continue;
-            }
-            runtime::note!("a task is refused: its mode is not there, or an agent of it");
-            let refused = Report { task: task.number, progress: Progress::Refused, ..Report::default() };
-            self.refused.send(refused);
+            };
+            runtime::note!("task {} is refused: its report says why", task.number);
+            self.refused.send(Report::refused(task.number, &why));
         }
         self.look_after();
         Ok(())
@@ -143,6 +145,26 @@ impl ProcessSupervisor {
         let system = self.router.system();
         missing(&known.mode, &system)
             .map(|agent| format!("the mode \"{name}\" needs \"{agent}\", which is not there or not alive"))
+    }
+
+    /// Why a mode that is there is none for a task: nobody in it does such a thing.
+    fn nobody_does(&self, task: &Task) -> Option<String> {
+        let system = self.router.system();
+        let does = |known: &Known| {
+            known.mode.rows.iter().any(|row| {
+                system.member(row.agent.as_str()).is_some_and(|member| may_do(member, task.motion))
+            })
+        };
+        let known = self.params.modes.find(task.mode.as_str())?;
+        if task.motion == Motion::Stand || does(known) {
+            return None;
+        }
+        let what = words(task.motion);
+        let others: Vec<&str> =
+            self.params.modes.known().filter(|known| does(known)).map(Known::name).collect();
+        let others =
+            if others.is_empty() { "no mode has one".into() } else { format!("in: {}", others.join(", ")) };
+        Some(format!("nobody in the mode \"{}\" {what}; {others}", task.mode))
     }
 
     fn begin(&mut self, task: Task) {
@@ -217,6 +239,33 @@ fn after_hands(task: Task) -> Task {
         motion if motion.has_place() => task,
         Motion::Wall => task,
         _ => Task { mode: task.mode, ..Task::default() },
+    }
+}
+
+/// Whether an agent may do such a motion: of our own actions that is known, of others only that they hear of tasks.
+fn may_do(member: Member<'_>, motion: Motion) -> bool {
+    match member.kind() {
+        "goto" => matches!(motion, Motion::Goto | Motion::Dock),
+        "navigator" => motion == Motion::Goto,
+        "path-follower" => motion == Motion::Path,
+        "move" => matches!(motion, Motion::Velocity | Motion::Distance | Motion::Turn | Motion::To),
+        "along-wall" => motion == Motion::Wall,
+        "avoid" | "escape" => false,
+        _ => member.ports().any(|port| port.info().shape.input == Some(MessageType::of::<Task>())),
+    }
+}
+
+fn words(motion: Motion) -> &'static str {
+    match motion {
+        Motion::Stand => "stands",
+        Motion::Velocity => "drives at a speed",
+        Motion::Distance => "drives a distance",
+        Motion::Turn => "turns on the spot",
+        Motion::Goto => "goes to a place",
+        Motion::Path => "follows a path",
+        Motion::Dock => "docks",
+        Motion::To => "drives straight to a place",
+        Motion::Wall => "follows a wall",
     }
 }
 

@@ -15,13 +15,16 @@
 use runtime::{Agent, Fault, Input, Output, Step};
 use types::messages::{EmergencyStop, MOST_AGENTS, Mode, Progress, Report, Task};
 use types::params::Params;
-use types::{AgentId, Duration, Name, Sequence, Time};
+use types::{AgentId, Duration, Name, Sequence, Text, Time};
 
 use crate::process_supervisor::IDLE;
 
 /// How long somebody may be silent.
 #[derive(Clone, Debug, Params)]
 pub struct SupervisorParams {
+    /// When no action of the mode has told of the task for so long, none does it, and it is refused (time). 1 s is fifty steps of an action.
+    #[param(default = Duration::secs(1), min = 0.05, max = 60.0)]
+    pub taken_up: Duration,
     /// An agent of the mode of which nothing is heard for so long is taken for dead (time). 250 ms is twelve steps of an action at 50 Hz, in which a robot at 0.6 m/s goes 15 cm.
     #[param(default = Duration::millis(250), min = 0.01, max = 60.0)]
     pub silence: Duration,
@@ -72,18 +75,26 @@ impl Agent for RealTimeSupervisor {
         while let Some(report) = self.reports.take() {
             over = over.or(self.door.hear(report.header().sender, *report, now));
         }
-        if let Some(progress) = over {
-            self.door.stand(progress);
+        if let Some((progress, why)) = over {
+            self.door.stand(progress, why);
             changed = true;
         }
         if self.stop.latest().is_some_and(|stop| stop.latched) && self.door.is_underway() {
             runtime::note!("the emergency stop is set: what was being done has ended");
-            self.door.stand(Progress::Halted);
+            self.door.stand(Progress::Halted, "the emergency stop is set; sinew reset ends it".into());
             changed = true;
         }
-        if self.door.somebody_is_silent(&self.params, |name| step.agent_named(name), now) {
+        if let Some(name) = self.door.silent(&self.params, |name| step.agent_named(name), now) {
             runtime::note!("an action of the mode is silent: standing");
-            self.door.stand(Progress::Halted);
+            let why = Text::format(format_args!("the action \"{name}\" is silent: it hangs or has died"));
+            self.door.stand(Progress::Halted, why);
+            changed = true;
+        }
+        if self.door.is_not_taken_up(&self.params, now) {
+            runtime::note!("no action of the mode does the task: standing");
+            let why =
+                Text::format(format_args!("no action of the mode \"{}\" does this", self.door.mode.name));
+            self.door.stand(Progress::Refused, why);
             changed = true;
         }
         if changed || self.told.is_none_or(|told| now - told >= TELL_AGAIN) {
@@ -115,6 +126,8 @@ struct Door {
     waiting: Option<Task>,
     /// When the mode came into force, and when each of its agents was heard last.
     since: Time,
+    /// When the task came into force, while no action has told of it.
+    fresh: Option<Time>,
     heard: Sequence<(AgentId, Time), MOST_AGENTS>,
 }
 
@@ -127,6 +140,7 @@ impl Default for Door {
             wanted: None,
             waiting: None,
             since: Time::ZERO,
+            fresh: None,
             heard: Sequence::new(),
         }
     }
@@ -148,13 +162,15 @@ impl Door {
         }
         self.mode = Mode { before: self.mode.name, ..mode };
         self.task = task;
+        // In a mode in which nobody is heard a task can only wait: for people who drive by hand.
+        self.fresh = (task.number > 0 && !mode.rows.is_empty()).then_some(now);
         let progress = if task.number == 0 { Progress::Idle } else { Progress::Underway };
         self.status = Report { task: task.number, progress, ..Report::default() };
         true
     }
 
-    /// Takes over a report; gives how the task ended when it is over by it.
-    fn hear(&mut self, sender: AgentId, report: Report, now: Time) -> Option<Progress> {
+    /// Takes over a report; gives how and why the task ended when it is over by it.
+    fn hear(&mut self, sender: AgentId, report: Report, now: Time) -> Option<(Progress, Text<127>)> {
         match self.heard.iter_mut().find(|(known, _)| *known == sender) {
             Some((_, at)) => *at = now,
             // More than a mode can name have no say in it.
@@ -165,9 +181,9 @@ impl Door {
         }
         // One that only watches tells of no way that is left; the one who drives does.
         if report.progress != Progress::Idle {
-            self.status = report;
+            (self.status, self.fresh) = (report, None);
         }
-        Some(report.progress).filter(|progress| progress.is_over())
+        report.progress.is_over().then_some((report.progress, report.why))
     }
 
     /// Whether somebody may drive for a task.
@@ -176,27 +192,36 @@ impl Door {
     }
 
     /// Makes the robot stand; the status tells why.
-    fn stand(&mut self, why: Progress) {
-        self.status.progress = if self.task.number == 0 { Progress::Idle } else { why };
+    fn stand(&mut self, progress: Progress, why: Text<127>) {
+        if self.task.number == 0 {
+            self.status.progress = Progress::Idle;
+        } else {
+            (self.status.progress, self.status.why) = (progress, why);
+        }
+        self.fresh = None;
         self.mode = Mode { name: IDLE.into(), before: self.mode.name, ..Mode::default() };
         self.task = Task { number: self.task.number, mode: Name::new(IDLE), ..Task::default() };
     }
 
-    /// Whether somebody whom the mode names was not heard of for too long.
-    fn somebody_is_silent(
+    /// Whether no action has told of the task for too long.
+    fn is_not_taken_up(&self, params: &SupervisorParams, now: Time) -> bool {
+        self.fresh.is_some_and(|since| now - since > params.taken_up)
+    }
+
+    /// Somebody whom the mode names and who was not heard of for too long.
+    fn silent(
         &self,
         params: &SupervisorParams,
         find: impl Fn(&str) -> Option<AgentId>,
         now: Time,
-    ) -> bool {
+    ) -> Option<Name> {
         let last = |name: &Name| {
             let id = find(name.as_str())?;
             self.heard.iter().find(|(known, _)| *known == id).map(|(_, at)| *at)
         };
-        self.mode.rows.iter().any(|row| {
-            // From its beginning an action has the same time as between two reports.
-            now - last(&row.agent).unwrap_or(self.since).max(self.since) > params.silence
-        })
+        let mut agents = self.mode.rows.iter().map(|row| row.agent);
+        // From its beginning an action has the same time as between two reports.
+        agents.find(|agent| now - last(agent).unwrap_or(self.since).max(self.since) > params.silence)
     }
 }
 
@@ -257,8 +282,8 @@ mod tests {
             None,
             "another's"
         );
-        let over = door.hear(GOTO, report(Progress::Arrived), at(60)).unwrap();
-        door.stand(over);
+        let (over, why) = door.hear(GOTO, report(Progress::Arrived), at(60)).unwrap();
+        door.stand(over, why);
         assert_eq!((door.mode.name.as_str(), door.mode.rows.len()), (IDLE, 0));
         assert_eq!((door.status.progress, door.status.distance), (Progress::Arrived, 0.004));
         assert_eq!(door.hear(GOTO, report(Progress::Unreachable), at(80)), None, "it has ended already");
@@ -271,7 +296,7 @@ mod tests {
         assert!(!door.is_underway(), "there is none");
         door = underway();
         assert!(door.is_underway());
-        door.stand(Progress::Halted);
+        door.stand(Progress::Halted, Text::default());
         assert!(!door.is_underway());
         assert_eq!((door.status.progress, door.mode.name.as_str()), (Progress::Halted, IDLE));
     }
@@ -280,13 +305,31 @@ mod tests {
     fn who_is_silent_for_too_long_makes_the_robot_stand() {
         let params = SupervisorParams::default();
         let mut door = underway();
-        assert!(!door.somebody_is_silent(&params, find, at(250)));
-        assert!(door.somebody_is_silent(&params, find, at(251)), "it never spoke");
+        let is_silent = |door: &Door, millis| door.silent(&params, find, at(millis)).is_some();
+        assert!(!is_silent(&door, 250));
+        assert!(is_silent(&door, 251), "it never spoke");
         door.hear(GOTO, Report::default(), at(200));
-        assert!(!door.somebody_is_silent(&params, find, at(450)));
-        assert!(door.somebody_is_silent(&params, find, at(451)));
-        assert!(door.somebody_is_silent(&params, |_| None, at(451)), "it is not there at all");
-        door.stand(Progress::Halted);
-        assert!(!door.somebody_is_silent(&params, find, at(9000)), "nobody is needed to stand");
+        assert!(!is_silent(&door, 450));
+        assert!(is_silent(&door, 451));
+        assert_eq!(door.silent(&params, |_| None, at(451)), Some("goto".into()), "it is not there at all");
+        door.stand(Progress::Halted, Text::EMPTY);
+        assert!(!is_silent(&door, 9000), "nobody is needed to stand");
+    }
+
+    #[test]
+    fn a_task_that_no_action_takes_up_is_not_underway_for_ever() {
+        let params = SupervisorParams::default();
+        let mut door = underway();
+        door.hear(GOTO, Report::default(), at(900));
+        assert!(!door.is_not_taken_up(&params, at(1000)));
+        assert!(door.is_not_taken_up(&params, at(1001)), "all that it tells is that it is there");
+        door.hear(GOTO, Report { task: 1, progress: Progress::Underway, ..Report::default() }, at(1000));
+        assert!(!door.is_not_taken_up(&params, at(9000)));
+        door.stand(Progress::Refused, "no action".into());
+        assert_eq!((door.status.progress, door.status.why.as_str()), (Progress::Refused, "no action"));
+        // While people drive by hand a task waits, and nobody is to take it up.
+        let by_hand = Mode { name: "teleoperation".into(), ..Mode::default() };
+        (door.wanted, door.waiting) = (Some(by_hand), Some(task(2, "teleoperation")));
+        assert!(door.open(at(9000)) && !door.is_not_taken_up(&params, at(20000)));
     }
 }

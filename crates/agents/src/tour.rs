@@ -63,17 +63,17 @@ impl TourParams {
         if let Some(place) = self.places.get(number) {
             let (x, y) = (*place.first()?, *place.get(1)?);
             let heading = place.get(2).copied();
-            let (turned, dock) = (heading.is_some(), heading.is_some() && self.dock);
-            return Some(Goal { x, y, heading: heading.unwrap_or(0.0), turned, dock, ..goal });
+            let dock = heading.is_some() && self.dock;
+            return Some(Goal { x, y, heading: heading.unwrap_or(goal.heading), dock, ..goal });
         }
         let [x0, y0, x1, y1] = self.area[..] else { return None };
         let drawn = number - self.places.len();
         let draw = |what: &str| Stream::new(self.seed, what).uniform(drawn as u64);
+        let is_turned = drawn % 2 == 1 || self.dock;
         (drawn < self.random as usize).then(|| Goal {
             x: x0 + (x1 - x0) * draw("tour/x"),
             y: y0 + (y1 - y0) * draw("tour/y"),
-            heading: TAU * draw("tour/heading") - PI,
-            turned: drawn % 2 == 1 || self.dock,
+            heading: if is_turned { TAU * draw("tour/heading") - PI } else { goal.heading },
             dock: self.dock,
             ..goal
         })
@@ -140,15 +140,15 @@ mod tests {
             ..TourParams::default()
         };
         let at = |number| params.goal(number).unwrap();
-        assert_eq!((at(0).x, at(0).y, at(0).turned), (1.0, 2.0, false));
-        assert_eq!((at(1).heading, at(1).turned), (1.5, true));
+        assert_eq!((at(0).x, at(0).y, at(0).heading.is_nan()), (1.0, 2.0, true));
+        assert_eq!(at(1).heading, 1.5);
         let drawn: Vec<Goal> = (2..202).map(at).collect();
         assert!(drawn.iter().all(|goal| (-1.0..3.0).contains(&goal.x) && (2.0..4.0).contains(&goal.y)));
         let mean = drawn.iter().map(|goal| goal.x).sum::<f64>() / 200.0;
         assert!((mean - 1.0).abs() < 0.3, "evenly: {mean}");
-        assert_eq!(drawn.iter().filter(|goal| goal.turned).count(), 100);
+        assert_eq!(drawn.iter().filter(|goal| goal.heading.is_finite()).count(), 100);
         assert_eq!(params.goal(202), None);
-        assert_eq!(params.goal(5), params.goal(5), "the same again");
+        assert_eq!(params.goal(5), params.goal(5), "the same again, with a heading");
     }
 
     #[test]

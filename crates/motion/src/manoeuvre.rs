@@ -21,7 +21,7 @@ use crate::kinematics::{Twist, is_finite};
 use crate::profile::{Bounds, Profile, State, Unfit};
 use crate::steering::saturated;
 use crate::trajectory::{self, Gains};
-use libm::{fabs, fmin};
+use libm::{fabs, fmin, hypot};
 use types::geometry::{PI, wrap};
 use types::{Point, Pose};
 
@@ -120,6 +120,10 @@ pub struct Report {
     pub leg: usize,
     /// Where the reference is, seen from the body: ahead (m), to the left (m), heading (rad).
     pub error: Pose,
+    /// What of the whole move is not driven yet, by odometry: of a way (m), not negative; of a point the straight way there.
+    pub distance: f64,
+    /// And of the turn (rad), to the left; of a point what is missing to its heading.
+    pub angle: f64,
     /// Since the move began (s).
     pub seconds: f64,
 }
@@ -202,6 +206,7 @@ impl Manoeuvre {
             };
             self.leg = Some(leg);
             self.drive(&leg, pose);
+            self.tell_rest(&leg, pose);
             if self.in_leg < leg.profile.seconds() || !self.is_there() {
                 return self.judge(&leg);
             }
@@ -262,6 +267,25 @@ impl Manoeuvre {
         self.report.twist = saturated(wish, p.reserve * p.linear.velocity, p.reserve * p.angular.velocity);
         self.report.error = error;
         self.report.leg = self.index;
+    }
+
+    /// The rest of the plan, and what the body is behind it.
+    fn tell_rest(&mut self, leg: &Leg, pose: Pose) {
+        let Report { error, .. } = self.report;
+        let (distance, angle) = match self.wanted {
+            Move::To { point, heading } => {
+                let turn = heading.map_or(0.0, |heading| wrap(heading - pose.heading));
+                (pose.position().distance(point), turn)
+            }
+            _ => {
+                let planned = leg.profile.distance() - leg.profile.at(self.in_leg).position;
+                let along = leg.per.linear * planned + error.x;
+                // Beside a straight way it is off; beside an arc that is a matter of how much of it is driven.
+                let across = if leg.per.angular == 0.0 { error.y } else { 0.0 };
+                (hypot(along, across), leg.per.angular * planned + error.heading)
+            }
+        };
+        (self.report.distance, self.report.angle) = (distance, angle);
     }
 
     fn is_there(&self) -> bool {

@@ -135,6 +135,21 @@ impl FloorPlan {
         self.walls.is_empty() && self.discs.is_empty() && self.boxes.is_empty()
     }
 
+    /// The lower left and the upper right corner of all that stands on it (m); nothing where nothing does.
+    pub fn bounds(&self) -> Option<(Point, Point)> {
+        let blocks = self.walls.iter().filter_map(Wall::block).chain(self.boxes.iter().copied());
+        let walls = self.walls.iter().flat_map(|wall| [wall.from, wall.to]);
+        let discs = self.discs.iter().flat_map(|disc| {
+            let corner = Point::new(disc.radius, disc.radius);
+            [disc.centre - corner, disc.centre + corner]
+        });
+        let points = blocks.flat_map(|block| block.corners()).chain(walls).chain(discs);
+        points.map(|point| (point, point)).reduce(|(low, high), (point, _)| {
+            let low = Point::new(low.x.min(point.x), low.y.min(point.y));
+            (low, Point::new(high.x.max(point.x), high.y.max(point.y)))
+        })
+    }
+
     /// The lines and circles that are seen of it.
     fn elements(&self) -> Vec<Element> {
         let mut out = Vec::new();

@@ -268,7 +268,8 @@ fn top(which: &Which, json: bool) -> Result<ExitCode, Failure> {
 
 fn tap(which: &Which, port: &str, every: u64, count: Option<u64>, json: bool) -> Result<ExitCode, Failure> {
     let mut client = connect(which)?;
-    ask(&mut client, &["tap".to_owned(), port.to_owned(), format!("every={every}")])?;
+    let told = ask(&mut client, &["tap".to_owned(), port.to_owned(), format!("every={every}")])?;
+    let names = shown::Names::of(told["definition"].as_str().unwrap_or_default());
     let mut left = count.unwrap_or(u64::MAX);
     let mut documents = Vec::new();
     while left > 0 {
@@ -287,7 +288,7 @@ fn tap(which: &Which, port: &str, every: u64, count: Option<u64>, json: bool) ->
             }
             Event::Message { header, message, .. } => {
                 left -= 1;
-                terminal::say(&shown::heard(&header, &message));
+                terminal::say(&shown::heard(&header, &names.put_into(message)));
             }
             Event::Lost { count, .. } => {
                 terminal::tell(&format!("{count} messages were lost: this reader was too slow"))

@@ -98,7 +98,7 @@ fn shortest(x: f32) -> f64 {
     x.to_string().parse().unwrap_or(f64::from(x))
 }
 
-/// Writes the message that `value` describes. Fields that it does not name are zero, empty or false.
+/// Writes the message that `value` describes. Fields that it does not name are zero, empty or false, or no number where the schema says so.
 ///
 /// Every field that the message does not have, and every value that does not fit, is a mistake with its place; all are told.
 pub fn encode(schema: &Schema, value: &Entry) -> Result<Vec<u8>, Vec<Mistake>> {
@@ -139,7 +139,12 @@ impl Encoder {
             self.out.put(0u8);
         }
         for field in &schema.fields {
-            self.value(&field.kind, table.and_then(|table| table.get(&field.name)), &field.name);
+            match table.and_then(|table| table.get(&field.name)) {
+                None if field.or_nan && field.kind == Kind::F64 => {
+                    self.out.put(f64::NAN);
+                }
+                entry => self.value(&field.kind, entry, &field.name),
+            }
         }
     }
 
@@ -362,7 +367,7 @@ mod tests {
                     let mut schema = Schema { name: "a/msg/A".into(), fields: vec![], constants: vec![] };
                     for (i, (kind, value)) in fields.into_iter().enumerate() {
                         table.set(&format!("f{i}"), value);
-                        schema.fields.push(Field { name: format!("f{i}"), kind });
+                        schema.fields.push(Field { name: format!("f{i}"), kind, or_nan: false });
                     }
                     (Kind::Struct(schema), Value::Table(table))
                 }),
@@ -373,7 +378,8 @@ mod tests {
     proptest! {
         #[test]
         fn what_is_encoded_is_decoded((kind, value) in kind_and_value()) {
-            let fields = vec![Field { name: "head".into(), kind: Kind::Bool }, Field { name: "x".into(), kind }];
+            let field = |name: &str, kind| Field { name: name.into(), kind, or_nan: false };
+            let fields = vec![field("head", Kind::Bool), field("x", kind)];
             let schema = Schema { name: "a/msg/A".into(), fields, constants: vec![] };
             let tree = table(&[("head", Value::Bool(true)), ("x", value)]);
             let bytes = encode(&schema, &tree.clone().into()).unwrap();

@@ -26,6 +26,8 @@ pub struct Field {
     pub name: String,
     /// Its type.
     pub kind: Kind,
+    /// Whether it is no number (NaN) where nothing is said of it, and not zero. Texts do not tell that, only our own definitions.
+    pub or_nan: bool,
 }
 
 /// A named number or text that a definition gives to its readers.
@@ -164,7 +166,8 @@ impl Parts<'_> {
             if !taken.insert(field) {
                 return Err(ParseError::Twice(field.to_owned()));
             }
-            schema.fields.push(Field { name: field.to_owned(), kind: self.kind(of, name, field, inside)? });
+            let kind = self.kind(of, name, field, inside)?;
+            schema.fields.push(Field { name: field.to_owned(), kind, or_nan: false });
         }
         inside.pop();
         Ok(schema)
@@ -249,10 +252,19 @@ fn full_name(name: &str, beside: &str) -> String {
 
 impl From<&Definition> for Schema {
     fn from(definition: &Definition) -> Schema {
-        let field =
-            |field: &definition::Field| Field { name: field.name.to_owned(), kind: Kind::from(&field.kind) };
+        let field = |field: &definition::Field| Field {
+            name: field.name.to_owned(),
+            kind: Kind::from(&field.kind),
+            or_nan: field.or_nan,
+        };
+        let constant = |(name, value): &(&str, u8)| Constant {
+            name: (*name).to_owned(),
+            kind: Kind::Integer { bytes: 1, signed: false },
+            value: value.to_string(),
+        };
         let fields = definition.fields.iter().map(field).collect();
-        Schema { name: definition.name.to_owned(), fields, constants: Vec::new() }
+        let constants = definition.constants.iter().map(constant).collect();
+        Schema { name: definition.name.to_owned(), fields, constants }
     }
 }
 
@@ -301,6 +313,7 @@ mod tests {
             describe::<messages::Offer>(),
             describe::<messages::WheelTicks>(),
             describe::<messages::Landmarks>(),
+            describe::<messages::Report>(),
         ];
         for definition in definitions {
             let read = Schema::parse(definition.name, &definition.text());

@@ -47,6 +47,8 @@ pub struct Field {
     pub name: &'static str,
     /// Its type.
     pub kind: Kind,
+    /// Whether it is no number (NaN) where somebody describes the message without it, and not zero: so it can be told that it is missing.
+    pub or_nan: bool,
 }
 
 /// A message as other programs know it.
@@ -56,6 +58,8 @@ pub struct Definition {
     pub name: &'static str,
     /// Its fields in order.
     pub fields: Vec<Field>,
+    /// What the numbers of its fields mean, as constants: `PROGRESS_ARRIVED` is a value of the field `progress`.
+    pub constants: Vec<(&'static str, u8)>,
 }
 
 impl Kind {
@@ -94,7 +98,21 @@ impl Kind {
 impl Definition {
     /// A definition of `name` with `fields` in order.
     pub fn new(name: &'static str, fields: impl IntoIterator<Item = (&'static str, Kind)>) -> Definition {
-        Definition { name, fields: fields.into_iter().map(|(name, kind)| Field { name, kind }).collect() }
+        let fields = fields.into_iter().map(|(name, kind)| Field { name, kind, or_nan: false });
+        Definition { name, fields: fields.collect(), constants: Vec::new() }
+    }
+
+    /// The same, with no number in these fields where nothing is said of them.
+    pub fn or_nan(mut self, names: &[&str]) -> Definition {
+        for field in self.fields.iter_mut().filter(|field| names.contains(&field.name)) {
+            field.or_nan = true;
+        }
+        self
+    }
+
+    /// The same, with names for the numbers of its fields.
+    pub fn with_constants(self, constants: impl IntoIterator<Item = (&'static str, u8)>) -> Definition {
+        Definition { constants: constants.into_iter().collect(), ..self }
     }
 
     /// The name without its middle part: `geometry_msgs/Twist`.
@@ -102,9 +120,11 @@ impl Definition {
         self.name.replace("/msg/", "/")
     }
 
-    /// The fields as a `.msg` file gives them, a line each.
+    /// The constants and the fields as a `.msg` file gives them, a line each.
     pub fn lines(&self) -> String {
-        self.fields.iter().map(|field| format!("{} {}\n", field.kind.ros(), field.name)).collect()
+        let constants = self.constants.iter().map(|(name, value)| format!("uint8 {name}={value}\n"));
+        let fields = self.fields.iter().map(|field| format!("{} {}\n", field.kind.ros(), field.name));
+        constants.chain(fields).collect()
     }
 
     /// The whole `ros2msg` schema: the fields, then each message that they use behind its name.

@@ -29,6 +29,14 @@ impl<const N: usize> Text<N> {
         Text { len: end as u8, bytes }
     }
 
+    /// As much of what is to be written as has room, without memory of its own: `Text::format(format_args!("{x} m"))`.
+    pub fn format(what: fmt::Arguments<'_>) -> Text<N> {
+        let mut text = Text::EMPTY;
+        // Writing into a text cannot fail: what has no room is cut.
+        let _ = fmt::Write::write_fmt(&mut text, what);
+        text
+    }
+
     /// The text.
     pub fn as_str(&self) -> &str {
         core::str::from_utf8(&self.bytes[..usize::from(self.len)]).unwrap_or_default()
@@ -37,6 +45,20 @@ impl<const N: usize> Text<N> {
     /// Whether there is no text.
     pub fn is_empty(&self) -> bool {
         self.len == 0
+    }
+}
+
+/// Adds as much as has room.
+impl<const N: usize> fmt::Write for Text<N> {
+    fn write_str(&mut self, more: &str) -> fmt::Result {
+        let at = usize::from(self.len);
+        let mut end = more.len().min(N.min(255) - at);
+        while !more.is_char_boundary(end) {
+            end -= 1;
+        }
+        self.bytes[at..at + end].copy_from_slice(&more.as_bytes()[..end]);
+        self.len += end as u8;
+        Ok(())
     }
 }
 
@@ -161,6 +183,8 @@ mod tests {
         assert_eq!(Text::<4>::new("köln").as_str(), "köl");
         assert_eq!(Text::<2>::new("kö").as_str(), "k");
         assert_eq!(Name::new("wall").as_str(), "wall");
+        assert_eq!(Text::<6>::format(format_args!("{} {}", 12, "köln")).as_str(), "12 kö");
+        assert_eq!(Text::<3>::format(format_args!("{} {}", 12, "köln")).as_str(), "12 ");
     }
 
     #[test]

@@ -31,6 +31,12 @@ pub(super) struct Known {
     pub(super) dies: Name,
 }
 
+impl Known {
+    pub(super) fn name(&self) -> &str {
+        self.mode.name.as_str()
+    }
+}
+
 impl ModeTable {
     /// Makes a table ready. What is wrong in it counts for nothing: [`mistakes`](Self::mistakes) says what that is.
     pub fn new(written: &Table) -> ModeTable {
@@ -52,9 +58,14 @@ impl ModeTable {
         self.rows.iter().find(|known| known.mode.name.as_str() == name)
     }
 
-    /// The names of the modes, in the order of the table.
+    /// The modes, in the order of the table.
+    pub(super) fn known(&self) -> impl Iterator<Item = &Known> + Clone {
+        self.rows.iter()
+    }
+
+    /// Their names, in the same order.
     pub(super) fn names(&self) -> impl Iterator<Item = &str> + Clone {
-        self.rows.iter().map(|known| known.mode.name.as_str())
+        self.known().map(Known::name)
     }
 }
 

@@ -2,6 +2,7 @@
 
 #![allow(clippy::unwrap_used)] // a test may
 
+mod asking;
 mod deciding;
 mod localizing;
 mod reacting;

@@ -147,12 +147,24 @@ fn a_push_sideways_is_driven_out_again() {
 
 #[test]
 fn what_holds_it_is_told() {
-    for wanted in
-        [Move::Distance(1.0), Move::Turn(2.0), Move::Velocity { twist: Twist::new(0.3, 0.1), seconds: 4.0 }]
-    {
+    let velocity = Move::Velocity { twist: Twist::new(0.3, 0.1), seconds: 4.0 };
+    let to = Move::To { point: types::Point::new(-3.0, 0.0), heading: Some(1.0) };
+    // None of it is driven, so all of it is left, however soon it gave up.
+    for (wanted, distance, angle) in [
+        (Move::Distance(1.0), 1.0, 0.0),
+        (Move::Distance(-5.0), 5.0, 0.0),
+        (Move::Turn(2.0), 0.0, 2.0),
+        (Move::Turn(-7.0), 0.0, -7.0),
+        (velocity, 1.2, 0.4),
+        (to, 3.0, 1.0),
+    ] {
         let mut manoeuvre = Manoeuvre::new(Parameters::default(), wanted).unwrap();
         let last = (0..500).map(|_| manoeuvre.step(Pose::default(), STEP)).last().unwrap();
         assert_eq!((last.outcome, last.twist), (Outcome::Blocked, Twist::ZERO), "{wanted:?}");
+        let off = fabs(last.distance - distance) + fabs(last.angle - angle);
+        // What it is behind on an arc is measured along a straight line.
+        let bent = if wanted == velocity { 1e-3 } else { 1e-9 };
+        assert!(off < bent, "{wanted:?}: {} m, {} rad", last.distance, last.angle);
     }
     // A drive that stops short of the end by less than counts as blocked.
     let mut manoeuvre = Manoeuvre::new(Parameters::default(), Move::Distance(0.1)).unwrap();

@@ -107,8 +107,7 @@ fn message(verb: &str, name: &str, plan: &Plan, registry: &Registry) -> Result<S
             None => refusal,
         });
     };
-    let definition = (message.definition)();
-    Schema::parse(definition.name, &definition.text()).map_err(|error| Refusal::new(error.to_string()))
+    Ok(Schema::from(&(message.definition)()))
 }
 
 #[cfg(test)]

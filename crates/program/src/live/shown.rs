@@ -214,6 +214,32 @@ pub(super) fn heard(header: &Json, message: &Json) -> String {
     format!("{out}\n{}", self::message(message))
 }
 
+/// What the numbers of some fields mean, as the constants of a definition say it: `uint8 PROGRESS_ARRIVED=2` is of the field `progress`.
+pub(super) struct Names(Vec<(String, i64)>);
+
+impl Names {
+    pub(super) fn of(definition: &str) -> Names {
+        // Behind the first row of signs come the parts of the message.
+        let lines = definition.lines().take_while(|line| !line.starts_with('='));
+        let constants = lines.filter_map(|line| line.split_once(' ')?.1.split_once('='));
+        Names(constants.filter_map(|(name, value)| Some((name.to_owned(), value.parse().ok()?))).collect())
+    }
+
+    /// The message with the names beside the numbers, for people.
+    pub(super) fn put_into(&self, mut message: Json) -> Json {
+        let Some(rows) = message.as_object_mut() else { return message };
+        for (field, value) in rows {
+            let Some(number) = value.as_i64() else { continue };
+            let prefix = format!("{}_", field.to_uppercase());
+            let mut named = self.0.iter().filter(|(_, known)| *known == number);
+            if let Some(name) = named.find_map(|(name, _)| name.strip_prefix(&prefix)) {
+                *value = format!("{number} ({})", name.to_lowercase().replace('_', " ")).into();
+            }
+        }
+        message
+    }
+}
+
 /// A message as one line a field.
 pub(super) fn message(message: &Json) -> String {
     let mut out = String::new();

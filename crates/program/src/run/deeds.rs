@@ -42,6 +42,34 @@ fn sixty_docks_are_met_within_a_centimetre_and_half_a_degree_with_wheels_that_sl
 }
 
 #[test]
+fn a_heading_that_is_said_is_turned_to_in_every_mode() {
+    for mode in ["goto", "path", "goto+avoid", "move"] {
+        let go = format!("call navigation.go x=4 y=3.5 heading=1.57 mode={mode}");
+        let summary = tried(&format!("heading-{mode}"), &[(1, &go)], 60).summary;
+        let outcome = ends(&summary, 1, Progress::Arrived);
+        let turned = outcome.turned.unwrap_or_else(|| panic!("{mode}: {outcome:?}"));
+        assert!(turned < 2f64.to_radians(), "{mode}: {outcome:?}");
+    }
+}
+
+#[test]
+fn among_people_it_turns_to_the_heading_that_was_asked_for_and_tells_the_true_rest() {
+    let summary = run("crowd-turns", &["crowd"], None, 300).summary;
+    let arrived = summary.tasks.iter().filter(|task| task.last.progress == Progress::Arrived);
+    let mut turned = 0;
+    for task in arrived {
+        let off = task.off.unwrap();
+        assert!((off - task.last.distance).abs() < 0.05, "{task:?}");
+        if let Some(left) = task.turned {
+            turned += 1;
+            assert!(left < 3f64.to_radians() && task.last.angle.abs() < 0.02, "{task:?}");
+        }
+    }
+    assert!(turned >= 2, "{:?}", summary.tasks);
+    nothing_touched(&summary);
+}
+
+#[test]
 fn a_place_is_driven_to_by_the_wheels_alone() {
     let go = "call navigation.go x=3.5 y=3.5 heading=-1.5708 turned=true mode=move";
     let summary = tried("by-wheels", &[(1, go)], 15).summary;

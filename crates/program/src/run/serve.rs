@@ -236,7 +236,7 @@ impl Hooks for RunHooks {
 
     fn encode(&self, definition: &Definition, message: &Json) -> Result<Vec<u8>, String> {
         let entry = Entry { value: control::json::from_json(message), at: Default::default() };
-        dynamic::encode(&schema(definition)?, &entry)
+        dynamic::encode(&Schema::from(definition), &entry)
             .map_err(|mistakes| mistakes.iter().map(ToString::to_string).collect::<Vec<_>>().join("; "))
     }
 }

@@ -1,7 +1,7 @@
 //! What became of the tasks of the reactive layer, for the summary.
 
 use serde_json::{Value as Json, json};
-use types::messages::Progress;
+use types::messages::{Progress, Report};
 
 use crate::figures::TaskOutcome;
 
@@ -11,7 +11,7 @@ pub(super) fn document(tasks: &[TaskOutcome]) -> Json {
         json!({
             "task": task.task, "ended": task.last.progress.word(), "at_s": task.at,
             "took_s": task.last.seconds, "left_m": task.last.distance, "left_rad": task.last.angle,
-            "off_m": task.off, "off_rad": task.turned,
+            "off_m": task.off, "off_rad": task.turned, "why": task.last.why.as_str(),
         })
     };
     tasks.iter().map(row).collect()
@@ -31,6 +31,7 @@ pub(super) fn text(tasks: &[TaskOutcome]) -> Vec<String> {
         let told: Vec<String> = words.iter().map(|word| format!("{} {word}", count(word))).collect();
         return [told.join(", ")]
             .into_iter()
+            .chain(reasons(tasks))
             .chain(errors(tasks))
             .enumerate()
             .map(|(i, what)| named(i, what))
@@ -38,6 +39,11 @@ pub(super) fn text(tasks: &[TaskOutcome]) -> Vec<String> {
     }
     let line = |task: &TaskOutcome| {
         let last = &task.last;
+        let why = if last.why.is_empty() { String::new() } else { format!(": {}", last.why) };
+        let head = format!("{:>2} {:<12} at {:.2} s", task.task, last.progress.word(), task.at);
+        if last.progress == Progress::Refused {
+            return format!("{head}{why}");
+        }
         let left = format!("{:.3} m and {:.1}° left", last.distance, last.angle.to_degrees());
         let left = match task.off {
             Some(off) => format!("{left}, in truth {off:.3} m"),
@@ -47,15 +53,22 @@ pub(super) fn text(tasks: &[TaskOutcome]) -> Vec<String> {
             Some(turned) => format!("{left} and {:.1}°", turned.to_degrees()),
             None => left,
         };
-        format!(
-            "{:>2} {:<12} at {:.2} s after {:.2} s, {left}",
-            task.task,
-            last.progress.word(),
-            task.at,
-            last.seconds
-        )
+        format!("{head} after {:.2} s, {left}{why}", last.seconds)
     };
     tasks.iter().enumerate().map(|(i, task)| named(i, line(task))).collect()
+}
+
+/// Why those that did not arrive ended, each reason once.
+fn reasons(tasks: &[TaskOutcome]) -> Vec<String> {
+    let mut rows: Vec<(&str, &str, usize)> = Vec::new();
+    for Report { progress, why, .. } in tasks.iter().map(|task| &task.last) {
+        match rows.iter_mut().find(|(word, known, _)| (*word, *known) == (progress.word(), why.as_str())) {
+            Some((_, _, count)) => *count += 1,
+            None if why.is_empty() => {}
+            None => rows.push((progress.word(), why.as_str(), 1)),
+        }
+    }
+    rows.into_iter().map(|(word, why, count)| format!("{count} {word}: {why}")).collect()
 }
 
 /// How far those that arrived truly were from their places and headings.
@@ -79,10 +92,10 @@ fn errors(tasks: &[TaskOutcome]) -> impl Iterator<Item = String> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use types::messages::Report;
 
     fn ended(task: u32, progress: Progress) -> TaskOutcome {
-        let last = Report { task, progress, distance: 0.0071, angle: 0.01, seconds: 9.5 };
+        let why = if progress == Progress::Arrived { "" } else { "it is so" }.into();
+        let last = Report { task, progress, distance: 0.0071, angle: 0.01, seconds: 9.5, why };
         TaskOutcome { task, at: 12.5, last, off: Some(0.004), turned: Some(0.5f64.to_radians()) }
     }
 
@@ -96,10 +109,18 @@ mod tests {
             "{told:?}"
         );
         assert!(told[1].contains("timed out") && told[1].contains("0.007 m and 0.6° left"), "{told:?}");
+        assert!(told[1].ends_with("in truth 0.004 m and 0.5°: it is so"), "{told:?}");
+        assert_eq!(
+            text(&[ended(3, Progress::Refused)]),
+            ["  tasks         3 refused      at 12.50 s: it is so"],
+            "nothing of it was done"
+        );
         assert_eq!(document(&few)[1]["ended"], "timed out");
+        assert_eq!(document(&few)[1]["why"], "it is so");
         let many: Vec<_> = (0..30).map(|i| ended(i, Progress::Arrived)).chain(few).collect();
         let expected = [
             "  tasks        31 arrived, 1 timed out",
+            "               1 timed out: it is so",
             "               off in truth by 4.0 mm (median), 4.0 mm (99 %), 4.0 mm (most)",
             "               turned off by 0.5° (median), 0.5° (99 %), 0.5° (most)",
         ];

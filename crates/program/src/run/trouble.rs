@@ -145,6 +145,71 @@ fn a_real_time_supervisor_that_dies_makes_the_robot_stand_and_takes_the_next_goa
 }
 
 #[test]
+fn a_robot_that_stands_latched_tells_of_each_task_what_is_left_and_why() {
+    let requests = [
+        (1, "stop"),
+        (2, "call navigation.drive distance=5"),
+        (8, "call navigation.drive angle=1.5"),
+        (14, "call navigation.wall side=right distance=0.8 seconds=60"),
+        (30, "call navigation.wall side=right distance=0.8 seconds=5"),
+    ];
+    let summary = asked("latched", &requests, 40);
+    let ended = [1, 2, 3, 4].map(|task| ends(&summary, task, Progress::Unreachable).last);
+    assert!((ended[0].distance - 5.0).abs() < 0.01, "{:?}", ended[0]);
+    assert!((ended[1].angle - 1.5).abs() < 0.01, "{:?}", ended[1]);
+    assert!(ended[2].seconds < 9.0, "{:?}", ended[2]);
+    assert!(ended.iter().all(|last| last.why.as_str().contains("latch")), "{ended:?}");
+    assert!(way(&summary) < 1e-6);
+}
+
+#[test]
+fn a_robot_that_runs_into_a_wall_on_its_way_has_driven_what_it_has_driven() {
+    let summary = asked("into-the-step", &[(1, "call navigation.drive distance=1000")], 60);
+    let outcome = ends(&summary, 1, Progress::Unreachable);
+    assert!((outcome.last.distance + way(&summary) - 1000.0).abs() < 0.3, "{outcome:?}, {}", way(&summary));
+}
+
+#[test]
+fn what_cannot_be_done_ends_with_its_reason_and_leaves_what_is_being_done() {
+    let requests = [
+        (1, "call navigation.go x=8 y=2"),
+        (2, "call navigation.go"),
+        (3, "call navigation.go x=9"),
+        (4, "call navigation.go x=50 y=50"),
+        (5, "call navigation.go x=5 y=2 mode=idle"),
+        (6, "call navigation.go x=5 y=2 mode=teleoperation"),
+        (7, "call navigation.go x=5 y=2 mode=wall-following"),
+        (8, "call navigation.go x=5 y=2 mode=gotto"),
+        (60, "call navigation.drive linear=5 seconds=2"),
+    ];
+    let summary = asked("refused", &requests, 65);
+    let off = ends(&summary, 1, Progress::Arrived).off.unwrap();
+    assert!(off < 0.02, "{off} m off");
+    let whys = [2, 3, 4, 5, 6].map(|task| ends(&summary, task, Progress::Refused).last.why);
+    let expected = [
+        "nobody in the mode \"idle\" goes to a place; in: goto, goto+avoid",
+        "nobody in the mode \"teleoperation\" goes to a place; in: goto, goto+avoid",
+        "nobody in the mode \"wall-following\" goes to a place; in: goto, goto+avoid",
+        "there is no mode \"gotto\"; did you mean \"goto\"?",
+        "5 m/s is faster than the move action's linear_max of 0.5 m/s",
+    ];
+    assert_eq!(whys.each_ref().map(|why| why.as_str()), expected);
+    assert_eq!(summary.tasks.len(), 6, "the others had no number: {:?}", summary.tasks);
+}
+
+#[test]
+fn a_goal_that_another_replaces_is_told_to_have_been_replaced() {
+    let requests = [(1, "call navigation.go x=8 y=2"), (4, "call navigation.go x=3 y=5")];
+    let summary = asked("replaced", &requests, 60);
+    let first = ends(&summary, 1, Progress::Replaced);
+    assert_eq!(first.last.why.as_str(), "task 2 has taken its place");
+    assert!((4.0..4.2).contains(&first.at) && first.last.distance > 3.0, "{first:?}");
+    ends(&summary, 2, Progress::Arrived);
+    let noted = "task 1 is replaced by task 2";
+    assert!(summary.noted.iter().any(|note| note.what.contains(noted)), "{:?}", summary.noted);
+}
+
+#[test]
 fn a_goal_that_makes_no_sense_moves_nothing() {
     let summary =
         asked("senseless", &[(1, "call navigation.go x=1e9 y=0"), (2, "call navigation.drive")], 10);

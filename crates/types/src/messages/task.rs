@@ -1,20 +1,21 @@
 //! What the reactive layer is asked to do, and what becomes of it.
 
+use crate::definition::{Definition, Kind};
 use crate::geometry::Pose;
 use crate::message::{Field, Message};
 use crate::text::{Name, Text};
 
-/// A place to go to, as people and programs ask for it.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Message)]
+/// A place to go to, as people and programs ask for it. What is not said of x, y and the heading is no number (NaN).
+#[derive(Clone, Copy, Debug, PartialEq, Field)]
 #[repr(C)]
 pub struct Goal {
-    /// (m)
+    /// (m); it must be said.
     pub x: f64,
-    /// (m)
+    /// (m); it must be said.
     pub y: f64,
-    /// The heading at the end (rad); it counts where `turned` says so.
+    /// The heading at the end (rad); no number (NaN) for any.
     pub heading: f64,
-    /// Whether the robot is to have the heading at the end.
+    /// Whether the robot is to have a heading at the end: 0 where `heading` says no other. A heading that is said counts without it.
     pub turned: bool,
     /// Whether to come to the pose to a centimetre, slowly at the end.
     pub dock: bool,
@@ -25,6 +26,61 @@ pub struct Goal {
     /// The mode in which to go there; empty for the navigation module's choice.
     pub mode: Name,
 }
+
+impl Default for Goal {
+    fn default() -> Goal {
+        Goal {
+            x: f64::NAN,
+            y: f64::NAN,
+            heading: f64::NAN,
+            turned: false,
+            dock: false,
+            speed: 0.0,
+            seconds: 0.0,
+            mode: Name::EMPTY,
+        }
+    }
+}
+
+/// Makes a message of a struct that derives [`Field`], with what is to be added to its definition.
+macro_rules! message {
+    ($name:ident, $more:expr) => {
+        impl Message for $name {
+            type Element = crate::cdr::NoElement;
+            const NAME: &'static str = concat!("sinew_msgs/msg/", stringify!($name));
+
+            fn definition() -> Definition {
+                match <$name as crate::cdr::Field>::kind() {
+                    Kind::Struct(definition) => $more(definition),
+                    _ => Definition::new(Self::NAME, []),
+                }
+            }
+
+            fn encode(&self, _: &[crate::cdr::NoElement], _: crate::Time, out: &mut crate::cdr::Writer) {
+                crate::cdr::Field::write(self, out);
+            }
+
+            fn decode(
+                input: &mut crate::cdr::Reader<'_>,
+                _: &mut crate::cdr::NoRow,
+            ) -> Result<$name, crate::cdr::Error> {
+                crate::cdr::Field::read(input)
+            }
+
+            fn disturb(
+                &mut self,
+                _: &mut [crate::cdr::NoElement],
+                wild: bool,
+                draw: &mut dyn FnMut() -> f64,
+            ) {
+                crate::cdr::Field::disturb(self, wild, draw);
+            }
+        }
+    };
+}
+
+message!(Goal, |definition: Definition| definition.or_nan(&["x", "y", "heading"]));
+message!(Report, |definition: Definition| definition.with_constants(Progress::CONSTANTS));
 
 /// A motion without a place, as people and programs ask for it: a speed for a time, or a distance, or an angle.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Message)]
@@ -159,9 +215,24 @@ pub enum Progress {
     Refused = 6,
     /// The robot does not know where it is.
     Lost = 7,
+    /// Another task has taken its place.
+    Replaced = 8,
 }
 
 impl Progress {
+    /// The numbers in a [`Report`], by name.
+    pub const CONSTANTS: [(&'static str, u8); 9] = [
+        ("PROGRESS_IDLE", Progress::Idle as u8),
+        ("PROGRESS_UNDERWAY", Progress::Underway as u8),
+        ("PROGRESS_ARRIVED", Progress::Arrived as u8),
+        ("PROGRESS_TIMED_OUT", Progress::TimedOut as u8),
+        ("PROGRESS_UNREACHABLE", Progress::Unreachable as u8),
+        ("PROGRESS_HALTED", Progress::Halted as u8),
+        ("PROGRESS_REFUSED", Progress::Refused as u8),
+        ("PROGRESS_LOST", Progress::Lost as u8),
+        ("PROGRESS_REPLACED", Progress::Replaced as u8),
+    ];
+
     /// Whether nothing more will become of it.
     pub const fn is_over(self) -> bool {
         !matches!(self, Progress::Idle | Progress::Underway)
@@ -178,24 +249,34 @@ impl Progress {
             Progress::Halted => "halted",
             Progress::Refused => "refused",
             Progress::Lost => "lost",
+            Progress::Replaced => "replaced",
         }
     }
 }
 
 /// What becomes of a task, from who does it.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Message)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Field)]
 #[repr(C)]
 pub struct Report {
     /// The number of the task.
     pub task: u32,
-    /// How far it has come.
+    /// How far it has come: 0 idle, 1 underway, 2 arrived, 3 timed out, 4 unreachable, 5 halted, 6 refused, 7 lost, 8 replaced.
     pub progress: Progress,
-    /// What is left of the way, as the crow flies (m).
+    /// What is left of the way, by the robot's own pose (m): to a place as the crow flies, of a manoeuvre what is not driven yet.
     pub distance: f64,
-    /// What is left of the turn (rad).
+    /// What is left of the turn, by the robot's own pose (rad); 0 where no heading was asked for.
     pub angle: f64,
     /// For how long it has been done (s).
     pub seconds: f64,
+    /// Why it ended as it did, where it did not arrive.
+    pub why: Text<127>,
+}
+
+impl Report {
+    /// That a task cannot be done, and why.
+    pub fn refused(task: u32, why: &str) -> Report {
+        Report { task, progress: Progress::Refused, why: why.into(), ..Report::default() }
+    }
 }
 
 impl crate::cdr::Field for Pose {
@@ -214,5 +295,36 @@ impl crate::cdr::Field for Pose {
 
     fn read(input: &mut crate::cdr::Reader<'_>) -> Result<Pose, crate::cdr::Error> {
         Ok(Pose { x: input.get()?, y: input.get()?, heading: input.get()? })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::cdr::{Reader, Writer};
+
+    #[test]
+    fn the_numbers_of_a_report_have_names_in_its_definition() {
+        let text = Report::definition().text();
+        for (name, value) in Progress::CONSTANTS {
+            assert!(text.contains(&alloc::format!("uint8 {name}={value}\n")), "{text}");
+            let bytes = [0, 1, 0, 0, value];
+            let read: Progress = Reader::new(&bytes).unwrap().get().unwrap();
+            let word = read.word().replace(' ', "_").to_uppercase();
+            assert_eq!(name, alloc::format!("PROGRESS_{word}"));
+        }
+    }
+
+    #[test]
+    fn what_is_not_said_of_a_place_is_no_number() {
+        let definition = Goal::definition();
+        let or_nan = definition.fields.iter().filter(|field| field.or_nan).map(|field| field.name);
+        assert!(or_nan.eq(["x", "y", "heading"]));
+        let goal = Goal::default();
+        assert!(goal.x.is_nan() && goal.y.is_nan() && goal.heading.is_nan());
+        let mut out = Writer::new();
+        Goal { x: 1.0, ..goal }.encode(&[], crate::Time::ZERO, &mut out);
+        let read = Goal::decode(&mut Reader::new(out.bytes()).unwrap(), &mut Default::default()).unwrap();
+        assert!(read.x == 1.0 && read.y.is_nan());
     }
 }
