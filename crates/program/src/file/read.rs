@@ -207,7 +207,6 @@ impl<'r> Reader<'r> {
         self.queues(tree, "");
         self.collect_wires(tree, "");
         self.settle_wires();
-        self.requests(tree);
         decide::read(self, tree);
         modes::read(self);
         burden::read(self, tree);
@@ -217,6 +216,7 @@ impl<'r> Reader<'r> {
         knowledge::read(self, tree);
         self.read_world(tree);
         floor::read(self);
+        self.requests(tree);
         let judged = runtime::check(&self.plan, self.registry);
         let spoiled = &self.spoiled;
         self.mistakes.extend(judged.into_iter().filter(|mistake| !spoiled.contains(&mistake.at)));
