@@ -95,17 +95,7 @@ pub fn read(
     sets: &[String],
     registry: &Registry,
 ) -> Result<Loaded, Mistakes> {
-    let mut reader = Reader::new(registry, folder.unwrap_or(Path::new("")));
-    let base = reader.sources.add(name, text);
-    if let Some(mut tree) = tree::read(&reader.sources, base, &mut reader.mistakes) {
-        for assignment in sets {
-            if let Err(mistake) = set::set(&mut tree, &mut reader.sources, assignment) {
-                reader.mistakes.push(mistake);
-            }
-        }
-        reader.system(&tree, name);
-    }
-    reader.finish()
+    Reader::new(registry, folder.unwrap_or(Path::new(""))).file(text, name, sets)
 }
 
 /// Reads the text of a system file to a plan.
@@ -161,7 +151,7 @@ pub(super) fn unknown<'a>(
 }
 
 impl<'r> Reader<'r> {
-    fn new(registry: &'r Registry, folder: &Path) -> Reader<'r> {
+    pub(super) fn new(registry: &'r Registry, folder: &Path) -> Reader<'r> {
         Reader {
             registry,
             sources: Sources::default(),
@@ -175,6 +165,21 @@ impl<'r> Reader<'r> {
             folder: folder.to_owned(),
             world: None,
         }
+    }
+
+    /// Reads the text of a system file, with the `KEY=VALUE` changes to it.
+    fn file(mut self, text: &str, name: &str, sets: &[String]) -> Result<Loaded, Mistakes> {
+        let base = self.sources.add(name, text);
+        if let Some(mut tree) = tree::read(&self.sources, base, &mut self.mistakes) {
+            for assignment in sets {
+                if let Err(mistake) = set::set(&mut tree, &mut self.sources, assignment) {
+                    self.mistakes.push(mistake);
+                }
+            }
+            self.system(&tree, name);
+            compare::try_values(&mut self, &tree, name);
+        }
+        self.finish()
     }
 
     /// A reader that goes on where a system was read, with what is not yet in its plan.
@@ -196,7 +201,7 @@ impl<'r> Reader<'r> {
         }
     }
 
-    fn system(&mut self, tree: &Table, file: &str) {
+    pub(super) fn system(&mut self, tree: &Table, file: &str) {
         self.sections(tree, &SECTIONS, "a system file");
         self.name(tree, file);
         self.executors(tree);
