@@ -46,6 +46,9 @@ pub(super) const ROBOT: &str = "robot";
 /// The entries of a robot that are not its model's.
 pub(super) const OF_ROBOT: [&str; 2] = ["driver", "start"];
 
+/// Sections of a system that no world has.
+const OF_SYSTEM: [&str; 7] = ["agent", "executor", "queue", "wires", "decide", "goal", "burden"];
+
 /// A system file that was read, with what belongs to it.
 #[derive(Clone, Debug)]
 pub struct Loaded {
@@ -78,7 +81,7 @@ pub fn load(name: &str, sets: &[String], registry: &Registry) -> Result<Loaded, 
 /// As [`load`], and for entries of `[vary]` that lead nowhere, or a world without a free way.
 pub fn check(name: &str, sets: &[String], registry: &Registry) -> Result<Loaded, Mistakes> {
     let loaded = load(name, sets, registry)?;
-    match draw_once(&loaded) {
+    match draw_once(&loaded, registry) {
         Ok(()) => Ok(loaded),
         Err(list) => Err(Mistakes { sources: loaded.sources, list }),
     }
@@ -106,7 +109,7 @@ pub fn read_plan(text: &str, path: &str, registry: &Registry) -> Result<Plan, Mi
     read(text, path, Path::new(path).parent(), &[], registry).map(|loaded| loaded.plan)
 }
 
-fn draw_once(loaded: &Loaded) -> Result<(), Vec<Mistake>> {
+fn draw_once(loaded: &Loaded, registry: &Registry) -> Result<(), Vec<Mistake>> {
     let Some(world) = &loaded.world else { return Ok(()) };
     let mut mistakes = Vec::new();
     let section = |table: Option<&Table>, mistakes: &mut Vec<Mistake>| {
@@ -115,7 +118,17 @@ fn draw_once(loaded: &Loaded) -> Result<(), Vec<Mistake>> {
     let own = world.get("vary").and_then(|entry| entry.value.as_table());
     let vary = section(own, &mut mistakes).with(section(loaded.plan.section("vary"), &mut mistakes));
     let robots = loaded.plan.section(ROBOT).cloned().unwrap_or_default();
-    vary.draw(world, &robots, &[], 0).map(|_| ())
+    let drawn = vary.draw(world, &robots, &[], 0)?;
+    let gate = registry.get(ROBOT).map(|kind| kind.params.iter().map(|field| field.name));
+    let elsewhere: Vec<&str> = gate.into_iter().flatten().chain(OF_ROBOT).collect();
+    for row in drawn.robots.rows() {
+        let Some(table) = row.entry.value.as_table() else { continue };
+        let driver = table.get("driver").and_then(|entry| entry.value.as_text());
+        if matches!(driver.map(hardware::Spec::parse), Some(Ok(hardware::Spec::Simulated))) {
+            Model::read(table, row.entry.at, &elsewhere, &mut mistakes);
+        }
+    }
+    if mistakes.is_empty() { Ok(()) } else { Err(mistakes) }
 }
 
 /// Reads a system file and the files it uses.
@@ -406,7 +419,10 @@ impl<'r> Reader<'r> {
         let world = tree.get("world").and_then(|entry| self.world_of(entry));
         if let Some(entry) = tree.get("vary") {
             match &entry.value {
-                Value::Table(table) => drop(Vary::read(table, &mut self.mistakes)),
+                Value::Table(table) => {
+                    let vary = Vary::read(table, &mut self.mistakes);
+                    vary.into_iter().for_each(|vary| self.draws(&vary));
+                }
                 other => self.say(entry.at, format!("\"vary\" is {}, not a section", other.kind())),
             }
         }
@@ -423,6 +439,27 @@ impl<'r> Reader<'r> {
             // What is wrong with the world has been said.
             (Value::Table(_), None) => {}
             (other, _) => self.say(entry.at, format!("\"goal\" is {}, not a section", other.kind())),
+        }
+    }
+
+    /// Draws lead to robots that there are, or into the world.
+    fn draws(&mut self, vary: &Vary) {
+        for (path, at) in vary.paths() {
+            let mut words = path.split('.');
+            let section = words.next().unwrap_or_default();
+            if section == ROBOT {
+                let name = words.next().unwrap_or_default();
+                if self.robots.get(name).is_none() {
+                    let known = self.robots.rows().iter().map(|row| row.key.as_str());
+                    self.mistakes.push(Mistake::unknown(at, "robot", name, known));
+                }
+            } else if OF_SYSTEM.contains(&section) {
+                let what = format!(
+                    "\"{path}\" is drawn by no seed: it is an entry of neither the world nor a robot"
+                );
+                let help = "several values of an entry are for [compare], or for --set from run to run";
+                self.mistakes.push(Mistake::new(at, what).help(help));
+            }
         }
     }
 

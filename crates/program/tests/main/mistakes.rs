@@ -63,6 +63,28 @@ error: there is no agent \"sonra\"
 }
 
 #[test]
+fn a_draw_of_what_a_robot_has_not_is_told_at_the_draw_before_anything_runs() {
+    let said = |draw: &str| {
+        let sets = [format!("vary.{draw}={{ uniform = [0.9, 1.1] }}")];
+        match file::check("exploration", &sets, &registry()) {
+            Ok(_) => String::new(),
+            Err(mistakes) => Failure::from(mistakes).to_text(Paint::Plain),
+        }
+    };
+    assert_eq!(said("robot.h1.drive.right_scale"), "");
+    let wanted = "\
+error: there is no entry in \"drive\" \"lefft_scale\"
+ --> --set:1:1
+1 | vary.robot.h1.drive.lefft_scale={ uniform = [0.9, 1.1] }
+  | ^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^
+  = help: did you mean \"left_scale\"?
+";
+    assert_eq!(said("robot.h1.drive.lefft_scale"), wanted);
+    assert!(said("world.ligth").contains("--> --set:1:1"), "{}", said("world.ligth"));
+    assert!(said("robot.h7.drive.left_scale").contains("did you mean \"h1\"?"));
+}
+
+#[test]
 fn a_file_that_is_not_there_is_said_with_what_there_is() {
     let mistakes = file::load("exploraton", &[], &registry()).unwrap_err();
     let said = Failure::from(mistakes).to_text(Paint::Plain);
