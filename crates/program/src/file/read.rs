@@ -241,17 +241,26 @@ impl<'r> Reader<'r> {
         self.circle();
     }
 
-    /// Agents that make each other run without end, where all else is right.
+    /// Agents that make each other run without end.
     fn circle(&mut self) {
+        let mut plan = self.plan.clone();
         if !self.mistakes.is_empty() {
-            return;
+            // What else is wrong is no part of it, and would be in the way of the analysis.
+            for agent in &mut plan.agents {
+                agent.period = agent.period.map(|period| period.max(Duration::millis(1)));
+                agent.deadline = None;
+            }
+            let wrong = &self.mistakes;
+            plan.wires.retain(|wire| !wrong.iter().any(|mistake| mistake.at == wire.at));
         }
         let is_robot = |port: &str| self.robots.get(runtime::owner(port)).is_some();
         let pace = |port: &str| is_robot(port).then_some(hardware::robot::CYCLE);
         let assumed =
             Assumed { cost: &|_| Duration::ZERO, processors: 1, overhead: Duration::ZERO, pace: &pace };
-        let table = timetable(&self.plan, self.registry, &assumed);
-        if let Err(unsound) = table.system.analyse() {
+        let table = timetable(&plan, self.registry, &assumed);
+        if let Err(unsound) = table.system.analyse()
+            && (self.mistakes.is_empty() || matches!(unsound, Unsound::Circle(_)))
+        {
             let names: Vec<String> = self.plan.agents.iter().map(|agent| agent.name.clone()).collect();
             let Refusal { what, help } = why_unsound(&unsound, &names);
             let agents: &[usize] = if let Unsound::Circle(circle) = &unsound { circle } else { &[] };
