@@ -330,7 +330,11 @@ impl<'r> Reader<'r> {
                     }
                 }
             }
-            for entry in r.list("cpus").unwrap_or_default() {
+            let cpus = r.list("cpus");
+            if cpus.is_some_and(<[Entry]>::is_empty) {
+                r.report(none_to_run_on(r.place("cpus")));
+            }
+            for entry in cpus.unwrap_or_default() {
                 match entry.value {
                     Value::Int(n @ 0..=1023) => executor.cpus.push(n as usize),
                     _ => r.report(Mistake::new(
@@ -500,6 +504,12 @@ impl<'r> Reader<'r> {
     pub(super) fn say(&mut self, at: Span, what: String) {
         self.mistakes.push(Mistake::new(at, what));
     }
+}
+
+/// A thread that may run on no processor at all.
+pub(super) fn none_to_run_on(at: Span) -> Mistake {
+    Mistake::new(at, "\"cpus\" names no processor, and a thread needs one to run on")
+        .help("as in cpus = [0], or leave it out for all of them")
 }
 
 /// The policy of an executor, and whether what else is written of it goes with that.
