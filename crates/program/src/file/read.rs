@@ -70,7 +70,11 @@ pub struct Loaded {
 /// All mistakes of the file, its world and the files it uses.
 pub fn load(name: &str, sets: &[String], registry: &Registry) -> Result<Loaded, Mistakes> {
     match Shelf::Scenarios.find(name, Path::new("")) {
-        Ok(found) => read(&found.text, &found.name, found.folder.as_deref(), sets, registry),
+        Ok(found) => {
+            let folder = found.folder.as_deref().unwrap_or(Path::new(""));
+            let reader = Reader { is_whole: true, ..Reader::new(registry, folder) };
+            reader.file(&found.text, &found.name, sets)
+        }
         Err(mistake) => Err(Mistakes { sources: Sources::default(), list: vec![mistake] }),
     }
 }
@@ -145,6 +149,10 @@ pub(super) struct Reader<'r> {
     pub(super) names: Names,
     pub(super) folder: PathBuf,
     pub(super) world: Option<Table>,
+    /// Whether a wire was written that is not in the plan, because something is wrong with it or with its section.
+    pub(super) lost_wires: bool,
+    /// Whether this is the whole of a system that somebody wants to run: a plan in a log may be what a run left of it.
+    is_whole: bool,
 }
 
 /// `word` is none of `known`, said in words of one's own.
@@ -177,6 +185,8 @@ impl<'r> Reader<'r> {
             names: Names::default(),
             folder: folder.to_owned(),
             world: None,
+            lost_wires: false,
+            is_whole: false,
         }
     }
 
@@ -235,6 +245,9 @@ impl<'r> Reader<'r> {
         self.read_world(tree);
         floor::read(self);
         self.requests(tree);
+        if self.is_whole {
+            self.untriggered();
+        }
         let judged = runtime::check(&self.plan, self.registry);
         let spoiled = &self.spoiled;
         self.mistakes.extend(judged.into_iter().filter(|mistake| !spoiled.contains(&mistake.at)));
@@ -277,6 +290,7 @@ impl<'r> Reader<'r> {
                 Value::Table(_) => format!("there is no section [{}] in {what}", row.key),
                 _ => format!("there is no entry \"{}\" at the top of {what}", row.key),
             };
+            self.lost_wires |= nearest(&row.key, known.iter().copied()) == Some("wires");
             self.mistakes.push(unknown(row.key_at, said, &row.key, known.iter().copied()));
         }
     }
