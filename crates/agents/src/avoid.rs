@@ -22,7 +22,7 @@ use crate::trust::Again;
 #[derive(Clone, Debug, Params)]
 pub struct AvoidParams {
     /// The law: "nearness" for the Nearness Diagram with its situations, "smooth" for the one without.
-    #[param(default = "nearness")]
+    #[param(default = "nearness", words = ["nearness", "smooth"])]
     pub law: Text<8>,
     /// Where to, ahead of where the odometry began (m); a goal that is heard takes its place.
     #[param(default = 0.0, min = -1000.0, max = 1000.0)]
@@ -142,10 +142,6 @@ pub struct Avoid {
 
 impl Agent for Avoid {
     fn start(&mut self, _: &mut Step) -> Result<(), Fault> {
-        match self.params.law.as_str() {
-            "nearness" | "smooth" => {}
-            _ => return Err(Fault::new("\"law\" of an avoidance is \"nearness\" or \"smooth\"")),
-        }
         self.sight.law.get_or_insert_with(|| self.params.law());
         self.sight.memory.get_or_insert_with(|| Memory::new(self.params.memory()));
         Ok(())

@@ -12,17 +12,15 @@ use motion::fusion::{Cause, Held, Inference, Moment, Parameters, Veto};
 use runtime::{Agent, Fault, Input, Output, Step};
 use types::messages::{Coordination, Decision, MOST_AGENTS, Mode, Odometry, Offer, Safety, Twist};
 use types::params::Params;
-use types::value::{Mistake, Table, nearest};
 use types::{AgentId, Duration, Sequence, Text, Time};
 
 use crate::shared::{Dated, Offers};
 
 /// How offers are fused.
 #[derive(Clone, Debug, Params)]
-#[params(check = whole)]
 pub struct CoordinatorParams {
     /// How one command is made while no mode says it: "fuzzy", "vector-sum", "priority" or "subsumption". Without modes all have the same priority, and the greater weight stands above.
-    #[param(default = "fuzzy")]
+    #[param(default = "fuzzy", words = Coordination::WORDS)]
     pub coordination: Text<12>,
     /// What "much" means in speed (m/s). 0.6 is the highest speed of an indoor robot.
     #[param(default = 0.6, min = 0.01, max = 10.0)]
@@ -62,21 +60,6 @@ impl CoordinatorParams {
             ..Parameters::default()
         }
     }
-}
-
-/// What is wrong with the parameters that no range tells.
-fn whole(params: &CoordinatorParams, read: &Table) -> Vec<Mistake> {
-    let Some(entry) = read.get("coordination").filter(|_| method(&params.coordination).is_none()) else {
-        return Vec::new();
-    };
-    let said = entry.value.as_text().unwrap_or_default();
-    let words = Coordination::ALL.map(Coordination::word);
-    let what = format!("\"{said}\" is no way to coordinate");
-    let help = match nearest(said, words) {
-        Some(word) => format!("did you mean \"{word}\"?"),
-        None => format!("it is one of {}", words.map(|word| format!("\"{word}\"")).join(", ")),
-    };
-    vec![Mistake::new(entry.at, what).help(help)]
 }
 
 fn method<const N: usize>(word: &Text<N>) -> Option<Coordination> {
@@ -293,18 +276,6 @@ mod tests {
             Twist::ZERO,
             "at once: nothing is held"
         );
-    }
-
-    #[test]
-    fn an_unknown_way_to_coordinate_is_a_mistake_with_the_nearest_right_one() {
-        use types::value::Value;
-        let mut table = Table::new();
-        table.set("coordination", Value::Text("priorty".into()));
-        let read = CoordinatorParams { coordination: "priorty".into(), ..CoordinatorParams::default() };
-        let mistakes = whole(&read, &table);
-        assert_eq!(mistakes.len(), 1);
-        assert!(format!("{:?}", mistakes[0]).contains("did you mean \\\"priority\\\""), "{mistakes:?}");
-        assert!(whole(&CoordinatorParams::default(), &Table::new()).is_empty());
     }
 
     #[test]

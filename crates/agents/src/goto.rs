@@ -14,23 +14,21 @@ use motion::steering::{self, Behind, Law};
 use runtime::{Agent, Fault, Input, Output, Step};
 use types::messages::{Mode, Motion, Odometry, Offer, Progress, Report, Task, Twist};
 use types::params::Params;
-use types::value::{Mistake, Table, nearest};
 use types::{Duration, Pose, Text, Time};
 
 use crate::action::{Duty, NO_POSE, NOTHING, TOO_LONG, Whereabouts, bounded, limits, offer};
 
 /// The law, and what is good enough.
 #[derive(Clone, Debug, Params)]
-#[params(check = whole)]
 pub struct GotoParams {
     /// The law that steers: "aicardi", smooth from everywhere, or "linear".
-    #[param(default = "aicardi")]
+    #[param(default = "aicardi", words = ["aicardi", "linear"])]
     pub law: Text<8>,
     /// How fast the law lets the distance fall (1/s). 1 slows down over the last 0.3 m, and bears a hold of the command of 0.3 s.
     #[param(default = 1.0, min = 0.05, max = 10.0)]
     pub rate: f64,
     /// What it does about a goal that lies behind: "rotate" turns on the spot first, so that a laser in front sees where it goes; "reverse" backs up; "as-law" leaves it to the law.
-    #[param(default = "rotate")]
+    #[param(default = "rotate", words = ["rotate", "reverse", "as-law"])]
     pub behind: Text<8>,
     /// Highest speed (m/s). 0.3 is what the reactive layer's robot drove with.
     #[param(default = 0.3, min = 0.01, max = 10.0)]
@@ -71,22 +69,6 @@ pub struct GotoParams {
     /// How far before a dock the slow approach begins (m).
     #[param(default = 0.4, min = 0.05, max = 3.0)]
     pub standoff: f64,
-}
-
-const LAWS: [&str; 2] = ["aicardi", "linear"];
-const BEHINDS: [&str; 3] = ["rotate", "reverse", "as-law"];
-
-fn whole(params: &GotoParams, read: &Table) -> Vec<Mistake> {
-    let word = |key: &str, said: &str, known: &[&'static str]| {
-        let entry = read.get(key).filter(|_| !known.contains(&said))?;
-        let mistake = Mistake::new(entry.at, format!("\"{key}\" is none of {}", known.join(", ")));
-        Some(match nearest(said, known.iter().copied()) {
-            Some(near) => mistake.help(format!("did you mean \"{near}\"?")),
-            None => mistake,
-        })
-    };
-    let law = word("law", params.law.as_str(), &LAWS);
-    law.into_iter().chain(word("behind", params.behind.as_str(), &BEHINDS)).collect()
 }
 
 impl GotoParams {
@@ -265,7 +247,7 @@ mod tests {
 
     #[test]
     fn it_gets_to_points_and_poses_of_the_map_by_both_laws() {
-        for law in LAWS {
+        for law in ["aicardi", "linear"] {
             let params = GotoParams { law: law.into(), ..GotoParams::default() };
             for (x, y, heading) in [(4.0, 2.0, None), (1.0, 0.0, None), (3.0, 1.0, Some(-2.0))] {
                 let (end, report, _) = driven(&params, to(x, y, heading), 4000);

@@ -188,6 +188,40 @@ mod tests {
     }
 
     #[test]
+    fn a_parameter_that_takes_one_of_a_few_words_takes_no_other() {
+        let set = |word: &str, key: &str| {
+            let mut table = types::value::Table::new();
+            table.set(key, types::value::Value::from(word));
+            table
+        };
+        let mut found = Vec::new();
+        for known in registry().types() {
+            for field in known.params.iter().filter(|field| !field.words.is_empty()) {
+                found.push(format!("{}.{}", known.kind, field.name));
+                let default = field.default.as_text().unwrap();
+                assert!(field.words.contains(&default), "{default} of {}", known.kind);
+                // Each is told in the text of the parameter, too.
+                assert!(field.words.iter().all(|word| field.doc.contains(word)), "{}", field.doc);
+                assert!(field.words.iter().all(|word| known.check_params(&set(word, field.name)).is_empty()));
+                let told = known.check_params(&set("top", field.name));
+                let words = field.words.iter().map(|word| format!("\"{word}\""));
+                assert!(words.into_iter().all(|word| told[0].what.contains(&word)), "{told:?}");
+            }
+        }
+        found.sort();
+        let all = [
+            "avoid.law",
+            "coordinator.coordination",
+            "goto.behind",
+            "goto.law",
+            "move.profile",
+            "resource-manager.policy",
+            "wall-follower.side",
+        ];
+        assert_eq!(found, all);
+    }
+
+    #[test]
     fn every_default_lies_within_the_range_of_its_parameter() {
         for known in registry().types() {
             for field in &known.params {

@@ -5,7 +5,6 @@ use motion::profile::{Bounds, Unfit};
 use runtime::{Agent, Fault, Input, Output, Step};
 use types::messages::{Mode, Motion, Odometry, Offer, Progress, Report, Task, Twist};
 use types::params::Params;
-use types::value::{Mistake, Table};
 use types::{Text, Time};
 
 use crate::action::{Duty, NO_POSE, NOTHING, TOO_LONG, Whereabouts, bounded, offer};
@@ -15,10 +14,9 @@ type Why = Text<127>;
 
 /// What a motion may do.
 #[derive(Clone, Debug, Params)]
-#[params(check = whole)]
 pub struct MoveParams {
     /// How the speed grows and falls: "trapezoid", at once with full acceleration, or "s-curve", which bounds the jerk as well and does not let a tall body nod.
-    #[param(default = "s-curve")]
+    #[param(default = "s-curve", words = ["trapezoid", "s-curve"])]
     pub profile: Text<12>,
     /// Highest speed (m/s). 0.5 is a slow walk.
     #[param(default = 0.5, min = 0.01, max = 10.0)]
@@ -53,13 +51,6 @@ pub struct MoveParams {
     /// Farther behind the plan than this (m, or rad of a turn) something holds it.
     #[param(default = 0.2, min = 0.01, max = 5.0)]
     pub lag_max: f64,
-}
-
-fn whole(params: &MoveParams, read: &Table) -> Vec<Mistake> {
-    let known = ["trapezoid", "s-curve"].contains(&params.profile.as_str());
-    let entry = read.get("profile").filter(|_| !known);
-    let wrong = entry.map(|entry| Mistake::new(entry.at, "\"profile\" is \"trapezoid\" or \"s-curve\""));
-    wrong.into_iter().collect()
 }
 
 impl MoveParams {

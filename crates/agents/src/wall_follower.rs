@@ -18,7 +18,7 @@ use crate::shared::echoes;
 #[derive(Clone, Debug, Params)]
 pub struct WallParams {
     /// The side on which the wall is kept: "left" or "right". With the wall on the left it goes around a room clockwise.
-    #[param(default = "left")]
+    #[param(default = "left", words = ["left", "right"])]
     pub side: Text<8>,
     /// Radius of the robot (m). 0.225 is that of the exploring robot.
     #[param(default = 0.225, min = 0.01, max = 2.0)]
@@ -107,13 +107,6 @@ pub struct WallFollower {
 }
 
 impl Agent for WallFollower {
-    fn start(&mut self, _: &mut Step) -> Result<(), Fault> {
-        match self.params.side.as_str() {
-            "left" | "right" => Ok(()),
-            _ => Err(Fault::new("\"side\" of a wall follower is \"left\" or \"right\"")),
-        }
-    }
-
     /// What it remembers of the room, and where it was going.
     fn take_over(&mut self, before: &mut dyn Any) {
         if let Some(before) = before.downcast_mut::<WallFollower>() {

@@ -30,7 +30,8 @@ pub fn agent(input: TokenStream) -> TokenStream {
 
 /// Writes `types::params::Params` for a struct of documented fields.
 ///
-/// `#[param(default = 0.5, min = 0.1, max = 2.0)]` gives a default and a range; where a field names a default, `Default` is
+/// `#[param(default = 0.5, min = 0.1, max = 2.0)]` gives a default and a range, `words = ["left", "right"]` the words of which a text is
+/// one; where a field names a default, `Default` is
 /// written too. `#[param(flatten)]` takes in the fields of another such struct. `#[params(check = path)]` on the struct names a function
 /// of it and of the table it was read from, which says what is wrong with the whole.
 #[proc_macro_derive(Params, attributes(param, params))]

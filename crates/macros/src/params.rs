@@ -1,6 +1,8 @@
 //! Parameters.
 
-use quote::quote;
+use proc_macro2::{TokenStream, TokenTree};
+use quote::{ToTokens as _, quote};
+use syn::token::Bracket;
 use syn::{DeriveInput, Expr, Field, Path};
 
 use crate::names::{doc, ident, named_fields, path_to};
@@ -10,6 +12,7 @@ struct Said {
     default: Option<Expr>,
     min: Option<Expr>,
     max: Option<Expr>,
+    words: Option<TokenStream>,
     flatten: bool,
 }
 
@@ -27,8 +30,17 @@ fn said(field: &Field) -> syn::Result<Said> {
                 &mut said.min
             } else if meta.path.is_ident("max") {
                 &mut said.max
+            } else if meta.path.is_ident("words") {
+                let value = meta.value()?;
+                // Lists are no expressions for a parser that knows the simple ones alone.
+                said.words = Some(if value.peek(Bracket) {
+                    value.parse::<TokenTree>()?.into()
+                } else {
+                    value.parse::<Expr>()?.into_token_stream()
+                });
+                return Ok(());
             } else {
-                return Err(meta.error("a parameter has `default`, `min`, `max` or `flatten`"));
+                return Err(meta.error("a parameter has `default`, `min`, `max`, `words` or `flatten`"));
             };
             *place = Some(meta.value()?.parse()?);
             Ok(())
@@ -52,7 +64,7 @@ fn check(input: &DeriveInput) -> syn::Result<Option<Path>> {
     Ok(check)
 }
 
-pub(crate) fn derive(input: DeriveInput) -> syn::Result<proc_macro2::TokenStream> {
+pub(crate) fn derive(input: DeriveInput) -> syn::Result<TokenStream> {
     let types = path_to("types");
     let name = &input.ident;
     let (mut rows, mut sets, mut gets, mut defaults) = (Vec::new(), Vec::new(), Vec::new(), Vec::new());
@@ -96,6 +108,14 @@ pub(crate) fn derive(input: DeriveInput) -> syn::Result<proc_macro2::TokenStream
             None => quote!(::core::option::Option::None),
         };
         let (min, max) = (bound(said.min), bound(said.max));
+        let words = match &said.words {
+            Some(words) => quote!(&#words),
+            None => quote!(&[]),
+        };
+        let assign = match &said.words {
+            Some(_) => quote!(assign_word(&mut self.#id, value, #words)),
+            None => quote!(assign(&mut self.#id, value, #min, #max)),
+        };
         rows.push(quote! {
             rows.push(#types::params::ParamField {
                 name: #key,
@@ -104,11 +124,12 @@ pub(crate) fn derive(input: DeriveInput) -> syn::Result<proc_macro2::TokenStream
                 default: #types::params::ParamValue::to_value(&default.#id),
                 min: #min,
                 max: #max,
+                words: #words,
             });
         });
         sets.push(quote! {
             if key == #key {
-                return ::core::option::Option::Some(#types::params::assign(&mut self.#id, value, #min, #max));
+                return ::core::option::Option::Some(#types::params::#assign);
             }
         });
         gets.push(quote! {

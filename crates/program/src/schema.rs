@@ -134,7 +134,7 @@ fn choice<'a>(words: impl IntoIterator<Item = &'a str>, doc: &str) -> Json {
 }
 
 fn burden() -> Json {
-    let cpus = json!({"type": "array", "items": {"type": "integer", "minimum": 0, "maximum": 63},
+    let cpus = json!({"type": "array", "minItems": 1, "items": {"type": "integer", "minimum": 0, "maximum": 63},
         "description": "The processors on which it may run; all when nothing is said."});
     let priority = json!({"type": "integer", "minimum": 1, "maximum": 94, "description": "Its priority."});
     let rows = [
@@ -266,6 +266,7 @@ fn parameter(field: &ParamField) -> Json {
         Value::Table(_) if field.name == "floor" => json!({"type": ["object", "string"]}),
         Value::Table(_) => json!({"type": "object"}),
         Value::Text(_) if field.kind.starts_with("a time") => json!({"$ref": "#/$defs/time"}),
+        Value::Text(_) if !field.words.is_empty() => json!({"enum": field.words}),
         Value::Text(_) => json!({"type": "string"}),
     };
     if matches!(field.default, Value::Int(_) | Value::Float(_)) {
@@ -317,7 +318,7 @@ fn robot(kind: Option<&AgentType>) -> Json {
 fn executor() -> Json {
     let priority = json!({"type": "integer", "minimum": 1, "maximum": 94,
         "description": "Real-time priority; an ordinary thread when nothing is said."});
-    let cpus = json!({"type": "array", "items": {"type": "integer", "minimum": 0},
+    let cpus = json!({"type": "array", "minItems": 1, "items": {"type": "integer", "minimum": 0},
         "description": "The processors on which it may run."});
     let spin = time("How long before a release it stops sleeping and watches the clock.");
     let policy = choice(

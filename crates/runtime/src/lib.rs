@@ -136,7 +136,7 @@ pub use request::{
     Request, SystemView, WireTotals, WireView,
 };
 pub use ring::{MOST_MESSAGES, Overload};
-pub use router::{Admission, Incident, ServiceShape, TIMING_KEYS, robot_wires};
+pub use router::{Admission, Incident, ServiceShape, TIMING_KEYS, robot_wires, with_set};
 pub use service::{CALLS_UNDER_WAY, Call, Client, Reply, Service, Ticket};
 pub use simulated::Simulation;
 pub use stats::{AgentStats, Figure, Histogram};

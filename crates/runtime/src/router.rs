@@ -51,7 +51,7 @@ pub(crate) use asking::Said;
 pub(crate) use calls::OutsideCall;
 pub use calls::ServiceShape;
 pub(crate) use staged::Staged;
-pub use timing::TIMING_KEYS;
+pub use timing::{TIMING_KEYS, with_set};
 pub(crate) use wires::commanded_by_two;
 
 use timing::Nominal;

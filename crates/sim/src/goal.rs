@@ -85,6 +85,10 @@ impl Goal {
         let before = mistakes.len();
         let mut reader = TableReader::new(table, at, "the goal");
         let within = reader.duration("within").unwrap_or(Duration::secs(600));
+        if within <= Duration::ZERO {
+            let what = format!("\"within\" is {within}: a run lasts longer than no time");
+            reader.report(Mistake::new(reader.place("within"), what).help("as in within = \"600s\""));
+        }
         let collisions = match reader.int("collisions") {
             Some(n) if (0..=1_000_000).contains(&n) => n as u32,
             Some(n) => {
@@ -277,7 +281,7 @@ impl Progress {
 
 fn read_stage(table: &Table, at: Span, world: &WorldPlan, mistakes: &mut Vec<Mistake>) -> Option<Stage> {
     let mut reader = TableReader::new(table, at, "the stage");
-    let hold = reader.duration("hold").unwrap_or(Duration::ZERO);
+    let hold = not_negative(&mut reader, "hold").unwrap_or(Duration::ZERO);
     let inside = reader.text("inside");
     let near = reader.text("near");
     let follows = reader.text("follows");
@@ -294,7 +298,7 @@ fn read_stage(table: &Table, at: Span, world: &WorldPlan, mistakes: &mut Vec<Mis
         let names: Vec<&str> = people.clone().map(|person| person.name.as_str()).collect();
         if let Some(word) = follows {
             check(&mut reader, "follows", "person", word, names.clone());
-            let time = reader.duration("time").unwrap_or(Duration::secs(5));
+            let time = not_negative(&mut reader, "time").unwrap_or(Duration::secs(5));
             conditions.push(Condition::Follows(word.to_owned(), distance, time));
         }
         if let Some(word) = near {
@@ -323,6 +327,16 @@ fn read_stage(table: &Table, at: Span, world: &WorldPlan, mistakes: &mut Vec<Mis
     }
     reader.finish(mistakes);
     conditions.pop().map(|condition| Stage { condition, hold })
+}
+
+/// For how long something must be so.
+fn not_negative(reader: &mut TableReader<'_>, key: &str) -> Option<Duration> {
+    let time = reader.duration(key)?;
+    if time < Duration::ZERO {
+        let what = format!("\"{key}\" is {time}, a time cannot be negative");
+        reader.report(Mistake::new(reader.place(key), what).help(format!("as in {key} = \"1s\"")));
+    }
+    Some(time)
 }
 
 fn check(reader: &mut TableReader<'_>, key: &str, kind: &str, word: &str, known: Vec<&str>) {

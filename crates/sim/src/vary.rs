@@ -3,7 +3,7 @@
 //! A draw is a function of the files and the seed. When it leaves no free way, the next attempt of the same seed is made.
 
 use types::geometry::{PI, Pose};
-use types::value::{Entry, Mistake, Span, Table, TableReader, Value};
+use types::value::{Entry, Mistake, Row, Span, Table, TableReader, Value};
 use types::{Point, geometry::TAU};
 
 use crate::free_way;
@@ -79,6 +79,11 @@ impl Vary {
             }
         }
         (mistakes.len() == before).then_some(Vary { draws })
+    }
+
+    /// Where each draw leads, and where that is written.
+    pub fn paths(&self) -> impl Iterator<Item = (&str, Span)> {
+        self.draws.iter().map(|draw| (draw.path.as_str(), draw.at))
     }
 
     /// The draws of both; where both name an entry, `other` counts.
@@ -253,7 +258,9 @@ impl Draw {
             }
             Law::Scatter { .. } | Law::AnywhereIn(_) => return Ok(()),
         };
-        set_entry(world, robots, &self.path, value).map_err(|what| Mistake::new(self.at, what))
+        // What is wrong with a drawn entry is told at its draw: nobody else has written it.
+        let entry = Entry { value, at: self.at };
+        set_entry(world, robots, &self.path, entry).map_err(|what| Mistake::new(self.at, what))
     }
 }
 
@@ -297,26 +304,36 @@ fn item<'t>(list: &'t mut [Entry], word: &str) -> Option<&'t mut Entry> {
     list.get_mut(index)
 }
 
-fn set_entry(world: &mut Table, robots: &mut Table, path: &str, value: Value) -> Result<(), String> {
+fn set_entry(world: &mut Table, robots: &mut Table, path: &str, new: Entry) -> Result<(), String> {
     if let Some(entry) = entry_mut(world, robots, path)? {
-        entry.value = value;
+        *entry = new;
         return Ok(());
     }
-    let Some((parent, key)) = path.rsplit_once('.') else {
-        world.set(path, value);
-        return Ok(());
-    };
+    let Some((parent, key)) = path.rsplit_once('.') else { return grow(world, path, new) };
     // A path of one word is a table itself: the robots', or the world's.
     match (parent, entry_mut(world, robots, parent)?) {
-        ("world", _) => world.set(key, value),
-        (_, Some(Entry { value: Value::Table(table), .. })) => table.set(key, value),
-        (_, Some(_)) => return Err(format!("\"{parent}\" is no table")),
+        ("world", _) => grow(world, key, new),
+        (_, Some(Entry { value: Value::Table(table), .. })) => grow(table, key, new),
+        (_, Some(_)) => Err(format!("\"{parent}\" is no table")),
         (_, None) => {
             let (table, path) = root(world, robots, path);
-            table.set_path(path, value).map_err(|mistake| mistake.what)?;
+            grow(table, path, new)
         }
     }
-    Ok(())
+}
+
+/// Puts an entry where a path leads, with the tables on the way: all of them stand where the entry does.
+fn grow(table: &mut Table, path: &str, entry: Entry) -> Result<(), String> {
+    let (key, rest) = path.split_once('.').map_or((path, None), |(key, rest)| (key, Some(rest)));
+    if table.get(key).is_none() {
+        let value = if rest.is_some() { Value::Table(Table::new()) } else { entry.value.clone() };
+        table.push(Row { key: key.to_owned(), key_at: entry.at, entry: Entry { value, at: entry.at } });
+    }
+    match (rest, table.get_mut(key).map(|entry| &mut entry.value)) {
+        (Some(rest), Some(Value::Table(inner))) => grow(inner, rest, entry),
+        (Some(rest), Some(other)) => Err(format!("{} has no entry \"{rest}\"", other.kind())),
+        _ => Ok(()),
+    }
 }
 
 /// A thing that can be moved.

@@ -7,7 +7,7 @@ use core::fmt;
 
 use crate::text::Text;
 use crate::time::Duration;
-use crate::value::{Entry, Mistake, Table, Value};
+use crate::value::{Entry, Mistake, Table, Value, nearest};
 
 pub use macros::Params;
 
@@ -26,6 +26,8 @@ pub struct ParamField {
     pub min: Option<f64>,
     /// The most that it may be.
     pub max: Option<f64>,
+    /// The words of which it is one; none where any text will do, and for all that is no text.
+    pub words: &'static [&'static str],
 }
 
 /// What is known of all parameters of an agent.
@@ -64,6 +66,22 @@ impl core::error::Error for Refused {}
 /// assert_eq!(refused.to_string(), "must lie from 0.1 to 2, not 6");
 /// assert_eq!(following.set("kep", &Value::Float(0.6)), None);
 /// ```
+///
+/// A text that takes one of a few words names them:
+///
+/// ```
+/// use types::{Text, params::Params, value::Value};
+///
+/// /// On which side.
+/// #[derive(Clone, Debug, Params)]
+/// pub struct Along {
+///     /// The side of the wall.
+///     #[param(default = "left", words = ["left", "right"])]
+///     pub side: Text<8>,
+/// }
+/// let refused = Along::default().set("side", &Value::from("top")).unwrap().unwrap_err();
+/// assert_eq!(refused.to_string(), "must be \"left\" or \"right\", not \"top\"");
+/// ```
 pub trait Params: Default + Clone + Send + 'static {
     /// What is known of each.
     fn fields() -> Fields;
@@ -89,7 +107,11 @@ pub trait Params: Default + Clone + Send + 'static {
             match params.set(&row.key, &row.entry.value) {
                 Some(Ok(())) => {}
                 Some(Err(refused)) => {
-                    mistakes.push(Mistake::new(row.entry.at, format!("\"{}\" {refused}", row.key)))
+                    let mistake = Mistake::new(row.entry.at, format!("\"{}\" {refused}", row.key));
+                    mistakes.push(match meant::<Self>(&row.key, &row.entry.value) {
+                        Some(word) => mistake.help(format!("did you mean \"{word}\"?")),
+                        None => mistake,
+                    });
                 }
                 None => {
                     let fields = Self::fields();
@@ -117,6 +139,12 @@ pub trait Params: Default + Clone + Send + 'static {
         }
         table
     }
+}
+
+/// The word that was meant, of a parameter that takes one of a few.
+fn meant<P: Params>(key: &str, value: &Value) -> Option<&'static str> {
+    let field = P::fields().into_iter().find(|field| field.name == key)?;
+    nearest(value.as_text()?, field.words.iter().copied())
 }
 
 /// A type that a parameter can have.
@@ -156,6 +184,21 @@ pub fn assign<T: ParamValue>(
     }
     *place = new;
     Ok(())
+}
+
+/// Sets `place` to `value` where that is one of the words. Written into each set of parameters by its derive.
+pub fn assign_word<T: ParamValue>(place: &mut T, value: &Value, words: &[&str]) -> Result<(), Refused> {
+    let unknown = value.as_text().filter(|word| !words.contains(word));
+    if let Some(word) = unknown {
+        let words: Vec<String> = words.iter().map(|word| format!("\"{word}\"")).collect();
+        let known = match words.split_last() {
+            Some((last, [])) => last.clone(),
+            Some((last, before)) => format!("{} or {last}", before.join(", ")),
+            None => String::new(),
+        };
+        return Err(Refused(format!("must be {known}, not \"{word}\"")));
+    }
+    assign(place, value, None, None)
 }
 
 impl ParamValue for f64 {

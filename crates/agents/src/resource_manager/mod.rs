@@ -18,7 +18,6 @@ use runtime::{Agent, Census, Fault, Given, HostReading, Input, Manager, Output, 
 use schedule::manage::{Change, Governor, Ladder, Patience, Setting};
 use types::messages::{Grant, Load, Orders};
 use types::params::Params;
-use types::value::{Mistake, Table};
 use types::{Duration, Name, Sequence, Text, Time};
 
 use model::Model;
@@ -28,10 +27,9 @@ const POLICIES: [&str; 3] = ["elastic", "ladder", "none"];
 
 /// How it manages.
 #[derive(Clone, Debug, Params)]
-#[params(check = whole)]
 pub struct ResourceParams {
     /// By which rule: "elastic" takes from the least important as little as is needed; "ladder" halves the rate of whoever missed a deadline, as other systems do, for comparison; "none" looks on.
-    #[param(default = "elastic")]
+    #[param(default = "elastic", words = POLICIES)]
     pub policy: String,
     /// How long the load must have been low before anything is given back (time). 600 ms are three looks, and so no burst that is over at once.
     #[param(default = Duration::millis(600), min = 0.0, max = 60.0)]
@@ -80,15 +78,6 @@ pub struct ResourceManager {
 enum Rule {
     Elastic(Governor),
     Ladder(Ladder),
-}
-
-/// A rule that nobody knows.
-fn whole(params: &ResourceParams, read: &Table) -> Vec<Mistake> {
-    if POLICIES.contains(&params.policy.as_str()) {
-        return Vec::new();
-    }
-    let at = read.get("policy").map(|entry| entry.at).unwrap_or_default();
-    vec![Mistake::unknown(at, "policy of a resource manager", &params.policy, POLICIES)]
 }
 
 impl Agent for ResourceManager {
@@ -254,7 +243,7 @@ fn grant(agent: &Resident, given: &Given, cause: &str) -> Grant {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use types::value::Value;
+    use types::value::{Table, Value};
 
     #[test]
     fn a_rule_that_nobody_knows_is_told_with_the_nearest() {

@@ -1,6 +1,6 @@
 //! A bare task set: rows of `[[task]]` with times as texts with a unit, or exact fractions of one.
 
-use schedule::{Exact, Task, TaskSet};
+use schedule::{Exact, Task, TaskSet, What};
 use types::value::{Mistake, Span, Table, TableReader, nearest};
 
 use crate::error::Failure;
@@ -68,29 +68,38 @@ fn rows(tree: &Table, file: &str, mistakes: &mut Vec<Mistake>) -> Set {
             }
             known => known,
         });
-        let before = mistakes.len();
-        let spoils =
-            [("wcet", r.place("wcet")), ("period", r.place("period")), ("deadline", r.place("deadline"))];
+        let spoils = ["wcet", "period", "deadline", "jitter", "blocking"].map(|key| (key, r.place(key)));
         r.finish(mistakes);
         let (Some(cost), Some(period)) = (cost, period) else { continue };
-        if mistakes.len() > before {
-            continue;
-        }
         places.push((at, spoils));
         tasks.push(Named { name, task: Task { cost, period, deadline, jitter, blocking, processor } });
     }
     if let Err(wrong) = TaskSet::new(tasks.iter().map(|named| named.task.clone()).collect()) {
-        for wrong in wrong {
+        let stands_still =
+            |task: usize| wrong.iter().any(|other| other.task == task && other.what == What::Period);
+        for wrong in &wrong {
+            // That a deadline is later than no time follows from the period.
+            if wrong.what == What::LateDeadline && stands_still(wrong.task) {
+                continue;
+            }
             let (at, entries) = &places[wrong.task];
             let text = wrong.what.to_string();
-            let entry = entries.iter().find(|(key, _)| {
-                text.contains(match *key {
-                    "wcet" => "execution time",
-                    key => key,
-                })
-            });
+            let key = match wrong.what {
+                What::Period => "period",
+                What::Cost => "wcet",
+                What::Deadline | What::LateDeadline => "deadline",
+                What::Jitter => "jitter",
+                What::Blocking => "blocking",
+                _ => "",
+            };
+            let entry = entries.iter().find(|(known, _)| *known == key);
             let what = format!("task \"{}\": {text}", tasks[wrong.task].name);
-            mistakes.push(Mistake::new(entry.map_or(*at, |(_, at)| *at), what));
+            let mistake = Mistake::new(entry.map_or(*at, |(_, at)| *at), what);
+            mistakes.push(match wrong.what {
+                What::LateDeadline => mistake.help("a job must be done before the next one arrives"),
+                What::Period => mistake.help("as in period = \"5ms\""),
+                _ => mistake,
+            });
         }
     }
     Set { name, tasks }
@@ -200,7 +209,9 @@ mod tests {
         let told: Vec<(usize, String)> =
             failure.problems.iter().map(|it| (it.place.as_ref().unwrap().line, it.what.clone())).collect();
         let lines: Vec<usize> = told.iter().map(|(line, _)| *line).collect();
-        assert_eq!(lines, [4, 6, 8, 9, 12, 16], "{told:#?}");
+        assert_eq!(lines, [4, 6, 8, 9, 12, 15, 16], "{told:#?}");
+        let late = failure.problems.iter().find(|it| it.what.contains("deadline")).unwrap();
+        assert!(late.place.as_ref().unwrap().text.starts_with("deadline") && late.help.is_some(), "{late:?}");
     }
 
     #[test]

@@ -141,8 +141,16 @@ fn timing(r: &mut TableReader<'_>, agent: &mut AgentPlan) {
     agent.min_gap = span_of_time(r, "min_gap").unwrap_or(Duration::ZERO);
     agent.wake_gap = span_of_time(r, "wake_gap").unwrap_or(Duration::ZERO);
     agent.hang_after = span_of_time(r, "hang_after");
+    let stands_still = agent.period.is_some_and(|period| period <= Duration::ZERO);
+    for (key, span) in [("period", agent.period), ("deadline", agent.deadline)] {
+        if span.is_some_and(|span| span <= Duration::ZERO) {
+            let what = format!("the {key} must be longer than zero");
+            r.report(Mistake::new(r.place(key), what).help(format!("as in {key} = \"100ms\"")));
+        }
+    }
     if let (Some(period), Some(deadline)) = (agent.period, agent.deadline)
         && deadline > period
+        && !stands_still
     {
         let what = format!("the deadline {deadline} is longer than the period {period}");
         r.report(
@@ -162,7 +170,9 @@ fn timing(r: &mut TableReader<'_>, agent: &mut AgentPlan) {
         return;
     };
     let period = agent.period.unwrap_or(least);
-    if least <= Duration::ZERO || least > period || period > most {
+    if stands_still {
+        // What its period lies between follows from the period.
+    } else if least <= Duration::ZERO || least > period || period > most {
         let key = if least > Duration::ZERO && least <= period { "period_max" } else { "period_min" };
         let what = format!("the period {period} does not lie from {least} to {most}");
         r.report(Mistake::new(r.place(key), what));

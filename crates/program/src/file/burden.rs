@@ -3,9 +3,9 @@
 
 use runtime::{Burden, Plan};
 use types::Duration;
-use types::value::{Mistake, Span, Table, TableReader, Value};
+use types::value::{Entry, Mistake, Span, Table, TableReader, Value};
 
-use super::read::{Reader, span_of_time};
+use super::read::{Reader, none_to_run_on, span_of_time};
 
 /// The sections that are read here.
 const BURDEN: &str = "burden";
@@ -89,7 +89,11 @@ fn one(name: &str, at: Span, table: &Table, mistakes: &mut Vec<Mistake>) -> Opti
         r.report(Mistake::new(r.place("until"), what));
     }
     let mut cpus = Vec::new();
-    for entry in r.list("cpus").unwrap_or_default() {
+    let listed = r.list("cpus");
+    if listed.is_some_and(<[Entry]>::is_empty) {
+        r.report(none_to_run_on(r.place("cpus")));
+    }
+    for entry in listed.unwrap_or_default() {
         match entry.value {
             Value::Int(cpu) if (0..MOST_PROCESSORS).contains(&cpu) => cpus.push(cpu as usize),
             _ => {

@@ -12,7 +12,7 @@
 //! | TOML to a tree of values | `tree` |
 //! | built-in scenarios and worlds, and files by name | `library` |
 //! | `--set KEY=VALUE` | `set` |
-//! | the tree to a plan, with all mistakes | `read`, with `agent`, `group`, `wires`, `decide`, `modes`, `figure`, `lasting`, `knowledge`, `requests`, `calls` |
+//! | the tree to a plan, with all mistakes | `read`, with `agent`, `group`, `wires`, `decide`, `modes`, `figure`, `lasting`, `knowledge`, `requests`, `calls`, `untriggered` |
 //! | the plan to a text | `write` |
 
 mod agent;
@@ -33,6 +33,7 @@ mod set;
 mod sources;
 mod syntax;
 pub(crate) mod tree;
+mod untriggered;
 mod wires;
 mod write;
 

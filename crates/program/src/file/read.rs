@@ -46,6 +46,9 @@ pub(super) const ROBOT: &str = "robot";
 /// The entries of a robot that are not its model's.
 pub(super) const OF_ROBOT: [&str; 2] = ["driver", "start"];
 
+/// Sections of a system that no world has.
+const OF_SYSTEM: [&str; 7] = ["agent", "executor", "queue", "wires", "decide", "goal", "burden"];
+
 /// A system file that was read, with what belongs to it.
 #[derive(Clone, Debug)]
 pub struct Loaded {
@@ -67,7 +70,11 @@ pub struct Loaded {
 /// All mistakes of the file, its world and the files it uses.
 pub fn load(name: &str, sets: &[String], registry: &Registry) -> Result<Loaded, Mistakes> {
     match Shelf::Scenarios.find(name, Path::new("")) {
-        Ok(found) => read(&found.text, &found.name, found.folder.as_deref(), sets, registry),
+        Ok(found) => {
+            let folder = found.folder.as_deref().unwrap_or(Path::new(""));
+            let reader = Reader { is_whole: true, ..Reader::new(registry, folder) };
+            reader.file(&found.text, &found.name, sets)
+        }
         Err(mistake) => Err(Mistakes { sources: Sources::default(), list: vec![mistake] }),
     }
 }
@@ -78,7 +85,7 @@ pub fn load(name: &str, sets: &[String], registry: &Registry) -> Result<Loaded, 
 /// As [`load`], and for entries of `[vary]` that lead nowhere, or a world without a free way.
 pub fn check(name: &str, sets: &[String], registry: &Registry) -> Result<Loaded, Mistakes> {
     let loaded = load(name, sets, registry)?;
-    match draw_once(&loaded) {
+    match draw_once(&loaded, registry) {
         Ok(()) => Ok(loaded),
         Err(list) => Err(Mistakes { sources: loaded.sources, list }),
     }
@@ -95,17 +102,7 @@ pub fn read(
     sets: &[String],
     registry: &Registry,
 ) -> Result<Loaded, Mistakes> {
-    let mut reader = Reader::new(registry, folder.unwrap_or(Path::new("")));
-    let base = reader.sources.add(name, text);
-    if let Some(mut tree) = tree::read(&reader.sources, base, &mut reader.mistakes) {
-        for assignment in sets {
-            if let Err(mistake) = set::set(&mut tree, &mut reader.sources, assignment) {
-                reader.mistakes.push(mistake);
-            }
-        }
-        reader.system(&tree, name);
-    }
-    reader.finish()
+    Reader::new(registry, folder.unwrap_or(Path::new(""))).file(text, name, sets)
 }
 
 /// Reads the text of a system file to a plan.
@@ -116,7 +113,7 @@ pub fn read_plan(text: &str, path: &str, registry: &Registry) -> Result<Plan, Mi
     read(text, path, Path::new(path).parent(), &[], registry).map(|loaded| loaded.plan)
 }
 
-fn draw_once(loaded: &Loaded) -> Result<(), Vec<Mistake>> {
+fn draw_once(loaded: &Loaded, registry: &Registry) -> Result<(), Vec<Mistake>> {
     let Some(world) = &loaded.world else { return Ok(()) };
     let mut mistakes = Vec::new();
     let section = |table: Option<&Table>, mistakes: &mut Vec<Mistake>| {
@@ -125,7 +122,17 @@ fn draw_once(loaded: &Loaded) -> Result<(), Vec<Mistake>> {
     let own = world.get("vary").and_then(|entry| entry.value.as_table());
     let vary = section(own, &mut mistakes).with(section(loaded.plan.section("vary"), &mut mistakes));
     let robots = loaded.plan.section(ROBOT).cloned().unwrap_or_default();
-    vary.draw(world, &robots, &[], 0).map(|_| ())
+    let drawn = vary.draw(world, &robots, &[], 0)?;
+    let gate = registry.get(ROBOT).map(|kind| kind.params.iter().map(|field| field.name));
+    let elsewhere: Vec<&str> = gate.into_iter().flatten().chain(OF_ROBOT).collect();
+    for row in drawn.robots.rows() {
+        let Some(table) = row.entry.value.as_table() else { continue };
+        let driver = table.get("driver").and_then(|entry| entry.value.as_text());
+        if matches!(driver.map(hardware::Spec::parse), Some(Ok(hardware::Spec::Simulated))) {
+            Model::read(table, row.entry.at, &elsewhere, &mut mistakes);
+        }
+    }
+    if mistakes.is_empty() { Ok(()) } else { Err(mistakes) }
 }
 
 /// Reads a system file and the files it uses.
@@ -142,6 +149,10 @@ pub(super) struct Reader<'r> {
     pub(super) names: Names,
     pub(super) folder: PathBuf,
     pub(super) world: Option<Table>,
+    /// Whether a wire was written that is not in the plan, because something is wrong with it or with its section.
+    pub(super) lost_wires: bool,
+    /// Whether this is the whole of a system that somebody wants to run: a plan in a log may be what a run left of it.
+    is_whole: bool,
 }
 
 /// `word` is none of `known`, said in words of one's own.
@@ -161,7 +172,7 @@ pub(super) fn unknown<'a>(
 }
 
 impl<'r> Reader<'r> {
-    fn new(registry: &'r Registry, folder: &Path) -> Reader<'r> {
+    pub(super) fn new(registry: &'r Registry, folder: &Path) -> Reader<'r> {
         Reader {
             registry,
             sources: Sources::default(),
@@ -174,7 +185,24 @@ impl<'r> Reader<'r> {
             names: Names::default(),
             folder: folder.to_owned(),
             world: None,
+            lost_wires: false,
+            is_whole: false,
         }
+    }
+
+    /// Reads the text of a system file, with the `KEY=VALUE` changes to it.
+    fn file(mut self, text: &str, name: &str, sets: &[String]) -> Result<Loaded, Mistakes> {
+        let base = self.sources.add(name, text);
+        if let Some(mut tree) = tree::read(&self.sources, base, &mut self.mistakes) {
+            for assignment in sets {
+                if let Err(mistake) = set::set(&mut tree, &mut self.sources, assignment) {
+                    self.mistakes.push(mistake);
+                }
+            }
+            self.system(&tree, name);
+            compare::try_values(&mut self, &tree, name);
+        }
+        self.finish()
     }
 
     /// A reader that goes on where a system was read, with what is not yet in its plan.
@@ -196,7 +224,7 @@ impl<'r> Reader<'r> {
         }
     }
 
-    fn system(&mut self, tree: &Table, file: &str) {
+    pub(super) fn system(&mut self, tree: &Table, file: &str) {
         self.sections(tree, &SECTIONS, "a system file");
         self.name(tree, file);
         self.executors(tree);
@@ -207,7 +235,6 @@ impl<'r> Reader<'r> {
         self.queues(tree, "");
         self.collect_wires(tree, "");
         self.settle_wires();
-        self.requests(tree);
         decide::read(self, tree);
         modes::read(self);
         burden::read(self, tree);
@@ -217,23 +244,36 @@ impl<'r> Reader<'r> {
         knowledge::read(self, tree);
         self.read_world(tree);
         floor::read(self);
+        self.requests(tree);
+        if self.is_whole {
+            self.untriggered();
+        }
         let judged = runtime::check(&self.plan, self.registry);
         let spoiled = &self.spoiled;
         self.mistakes.extend(judged.into_iter().filter(|mistake| !spoiled.contains(&mistake.at)));
         self.circle();
     }
 
-    /// Agents that make each other run without end, where all else is right.
+    /// Agents that make each other run without end.
     fn circle(&mut self) {
+        let mut plan = self.plan.clone();
         if !self.mistakes.is_empty() {
-            return;
+            // What else is wrong is no part of it, and would be in the way of the analysis.
+            for agent in &mut plan.agents {
+                agent.period = agent.period.map(|period| period.max(Duration::millis(1)));
+                agent.deadline = None;
+            }
+            let wrong = &self.mistakes;
+            plan.wires.retain(|wire| !wrong.iter().any(|mistake| mistake.at == wire.at));
         }
         let is_robot = |port: &str| self.robots.get(runtime::owner(port)).is_some();
         let pace = |port: &str| is_robot(port).then_some(hardware::robot::CYCLE);
         let assumed =
             Assumed { cost: &|_| Duration::ZERO, processors: 1, overhead: Duration::ZERO, pace: &pace };
-        let table = timetable(&self.plan, self.registry, &assumed);
-        if let Err(unsound) = table.system.analyse() {
+        let table = timetable(&plan, self.registry, &assumed);
+        if let Err(unsound) = table.system.analyse()
+            && (self.mistakes.is_empty() || matches!(unsound, Unsound::Circle(_)))
+        {
             let names: Vec<String> = self.plan.agents.iter().map(|agent| agent.name.clone()).collect();
             let Refusal { what, help } = why_unsound(&unsound, &names);
             let agents: &[usize] = if let Unsound::Circle(circle) = &unsound { circle } else { &[] };
@@ -250,6 +290,7 @@ impl<'r> Reader<'r> {
                 Value::Table(_) => format!("there is no section [{}] in {what}", row.key),
                 _ => format!("there is no entry \"{}\" at the top of {what}", row.key),
             };
+            self.lost_wires |= nearest(&row.key, known.iter().copied()) == Some("wires");
             self.mistakes.push(unknown(row.key_at, said, &row.key, known.iter().copied()));
         }
     }
@@ -303,7 +344,11 @@ impl<'r> Reader<'r> {
                     }
                 }
             }
-            for entry in r.list("cpus").unwrap_or_default() {
+            let cpus = r.list("cpus");
+            if cpus.is_some_and(<[Entry]>::is_empty) {
+                r.report(none_to_run_on(r.place("cpus")));
+            }
+            for entry in cpus.unwrap_or_default() {
                 match entry.value {
                     Value::Int(n @ 0..=1023) => executor.cpus.push(n as usize),
                     _ => r.report(Mistake::new(
@@ -401,7 +446,10 @@ impl<'r> Reader<'r> {
         let world = tree.get("world").and_then(|entry| self.world_of(entry));
         if let Some(entry) = tree.get("vary") {
             match &entry.value {
-                Value::Table(table) => drop(Vary::read(table, &mut self.mistakes)),
+                Value::Table(table) => {
+                    let vary = Vary::read(table, &mut self.mistakes);
+                    vary.into_iter().for_each(|vary| self.draws(&vary));
+                }
                 other => self.say(entry.at, format!("\"vary\" is {}, not a section", other.kind())),
             }
         }
@@ -418,6 +466,27 @@ impl<'r> Reader<'r> {
             // What is wrong with the world has been said.
             (Value::Table(_), None) => {}
             (other, _) => self.say(entry.at, format!("\"goal\" is {}, not a section", other.kind())),
+        }
+    }
+
+    /// Draws lead to robots that there are, or into the world.
+    fn draws(&mut self, vary: &Vary) {
+        for (path, at) in vary.paths() {
+            let mut words = path.split('.');
+            let section = words.next().unwrap_or_default();
+            if section == ROBOT {
+                let name = words.next().unwrap_or_default();
+                if self.robots.get(name).is_none() {
+                    let known = self.robots.rows().iter().map(|row| row.key.as_str());
+                    self.mistakes.push(Mistake::unknown(at, "robot", name, known));
+                }
+            } else if OF_SYSTEM.contains(&section) {
+                let what = format!(
+                    "\"{path}\" is drawn by no seed: it is an entry of neither the world nor a robot"
+                );
+                let help = "several values of an entry are for [compare], or for --set from run to run";
+                self.mistakes.push(Mistake::new(at, what).help(help));
+            }
         }
     }
 
@@ -449,6 +518,12 @@ impl<'r> Reader<'r> {
     pub(super) fn say(&mut self, at: Span, what: String) {
         self.mistakes.push(Mistake::new(at, what));
     }
+}
+
+/// A thread that may run on no processor at all.
+pub(super) fn none_to_run_on(at: Span) -> Mistake {
+    Mistake::new(at, "\"cpus\" names no processor, and a thread needs one to run on")
+        .help("as in cpus = [0], or leave it out for all of them")
 }
 
 /// The policy of an executor, and whether what else is written of it goes with that.

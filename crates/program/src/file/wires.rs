@@ -69,7 +69,10 @@ impl Reader<'_> {
             }
         };
         let to = to.and_then(|(to, at)| self.end(&format!("{prefix}{to}"), at));
-        let (Some(to), Some(_)) = (to, from) else { return };
+        let (Some(to), Some(_)) = (to, from) else {
+            self.lost_wires = true;
+            return;
+        };
         wire.to = to;
         if self.plan.wires.iter().any(|other| other.from == wire.from && other.to == wire.to) {
             self.say(target.at, format!("there are two wires from {} to {}", wire.from, wire.to));

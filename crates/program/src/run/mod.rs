@@ -98,6 +98,9 @@ pub(crate) fn run(args: &RunArgs, registry: Registry, json: bool) -> Result<Exit
     if clock == ClockChoice::Wall {
         // In simulated time the judge stops them, at an instant that the log can tell.
         signals.stop(ready.robots.iter().map(|robot| robot.latch.clone()).collect());
+        for told in options::absent_processors(&ready.plan, Path::new(options::PROCESSORS)) {
+            terminal::tell(&format!("warning: {told}"));
+        }
     }
     let asked_to_end = signals.asked_to_end().clone();
     let watched = !json && terminal::watched();

@@ -138,6 +138,30 @@ pub(super) fn clock(args: &RunArgs, ready: &Ready) -> Result<ClockChoice, Failur
     }
 }
 
+/// Where the kernel tells which processors there are.
+pub(super) const PROCESSORS: &str = "/sys/devices/system/cpu";
+
+/// What is to be said of executors that shall run on processors which this machine has not: in simulated time no thread depends on them.
+pub(super) fn absent_processors(plan: &Plan, known: &Path) -> Vec<String> {
+    if !known.join("cpu0").exists() {
+        return Vec::new();
+    }
+    let is_absent = |cpu: &&usize| !known.join(format!("cpu{cpu}")).exists();
+    let told = plan.executors.iter().filter_map(|executor| {
+        let absent: Vec<String> = executor.cpus.iter().filter(is_absent).map(usize::to_string).collect();
+        let name = &executor.name;
+        let runs =
+            if absent.len() < executor.cpus.len() { "it runs on the others" } else { "it runs on any" };
+        (!absent.is_empty()).then(|| {
+            format!(
+                "executor \"{name}\" names processor {}, which this machine has not: {runs}",
+                absent.join(", ")
+            )
+        })
+    });
+    told.collect()
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -152,6 +176,27 @@ mod tests {
         let (requests, goal, figures) = scripted(&[]);
         assert!(requests > 10 && goal && figures);
         assert_eq!(scripted(&["--no-script"]), (0, false, false));
+    }
+
+    #[test]
+    fn a_processor_that_the_machine_has_not_is_told_before_the_run() {
+        let folder = std::env::temp_dir().join(format!("sinew-processors-{}", std::process::id()));
+        for cpu in ["cpu0", "cpu1"] {
+            std::fs::create_dir_all(folder.join(cpu)).unwrap();
+        }
+        let told = |cpus: &[usize]| {
+            let mut plan = Plan::new("p");
+            let executor = runtime::ExecutorPlan::new("fast", Some(60));
+            plan.executors.push(runtime::ExecutorPlan { cpus: cpus.to_vec(), ..executor });
+            absent_processors(&plan, &folder).join("\n")
+        };
+        assert_eq!(told(&[]), "");
+        assert_eq!(told(&[0, 1]), "");
+        let any = "executor \"fast\" names processor 77, which this machine has not: it runs on any";
+        assert_eq!(told(&[77]), any);
+        assert!(told(&[1, 77]).ends_with("it runs on the others"), "{}", told(&[1, 77]));
+        std::fs::remove_dir_all(&folder).unwrap();
+        assert_eq!(told(&[77]), "", "nobody can tell");
     }
 
     #[test]

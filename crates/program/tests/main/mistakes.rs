@@ -10,6 +10,8 @@ use crate::registry;
 
 /// Files that are parts of others.
 const PARTS: [&str; 3] = ["part", "own_name", "floor_part"];
+/// A file whose mistake is told where it is to be run: see below.
+const TO_BE_RUN: &str = "untriggered";
 
 #[test]
 fn wrong_files_are_told_what_is_wrong() {
@@ -20,7 +22,7 @@ fn wrong_files_are_told_what_is_wrong() {
         .filter_map(|entry| {
             entry.unwrap().file_name().to_str().unwrap().strip_suffix(".toml").map(str::to_owned)
         })
-        .filter(|name| !PARTS.contains(&name.as_str()))
+        .filter(|name| !PARTS.contains(&name.as_str()) && name != TO_BE_RUN)
         .collect();
     names.sort();
     assert!(names.len() >= 12, "{names:?}");
@@ -44,6 +46,20 @@ fn wrong_files_are_told_what_is_wrong() {
 }
 
 #[test]
+fn an_agent_to_whose_trigger_no_wire_leads_is_told_where_a_system_is_to_run() {
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/mistakes").join(TO_BE_RUN);
+    let file = path.with_extension("toml");
+    let mistakes = file::load(file.to_str().unwrap(), &[], &registry()).unwrap_err();
+    let said =
+        Failure::from(mistakes).to_text(Paint::Plain).replace(file.to_str().unwrap(), "untriggered.toml");
+    assert_eq!(said, fs::read_to_string(path.with_extension("txt")).unwrap());
+    // What a run of some agents left of a plan has fewer wires, and is read all the same.
+    let mut some = file::load("exploration", &[], &registry()).unwrap().plan;
+    some.only(&["wall".to_owned(), "safety".to_owned()]).unwrap();
+    assert!(file::read_plan(&file::write_plan(&some), "exploration", &registry()).is_ok());
+}
+
+#[test]
 fn a_change_on_the_command_line_is_shown_where_it_was_typed() {
     let sets = ["agent.wall.keep=far".to_owned(), "agent.sonra.deadline=1ms".to_owned()];
     let mistakes = file::load("exploration", &sets, &registry()).unwrap_err();
@@ -60,6 +76,28 @@ error: there is no agent \"sonra\"
         said.contains("error: \"keep\" must be a number, not a text (\"far\")\n --> --set:1:17\n"),
         "{said}"
     );
+}
+
+#[test]
+fn a_draw_of_what_a_robot_has_not_is_told_at_the_draw_before_anything_runs() {
+    let said = |draw: &str| {
+        let sets = [format!("vary.{draw}={{ uniform = [0.9, 1.1] }}")];
+        match file::check("exploration", &sets, &registry()) {
+            Ok(_) => String::new(),
+            Err(mistakes) => Failure::from(mistakes).to_text(Paint::Plain),
+        }
+    };
+    assert_eq!(said("robot.h1.drive.right_scale"), "");
+    let wanted = "\
+error: there is no entry in \"drive\" \"lefft_scale\"
+ --> --set:1:1
+1 | vary.robot.h1.drive.lefft_scale={ uniform = [0.9, 1.1] }
+  | ^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^
+  = help: did you mean \"left_scale\"?
+";
+    assert_eq!(said("robot.h1.drive.lefft_scale"), wanted);
+    assert!(said("world.ligth").contains("--> --set:1:1"), "{}", said("world.ligth"));
+    assert!(said("robot.h7.drive.left_scale").contains("did you mean \"h1\"?"));
 }
 
 #[test]

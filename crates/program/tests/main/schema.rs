@@ -73,5 +73,7 @@ fn a_parameter_carries_its_doc_its_range_and_its_default() {
         (&"number".into(), &0.0.into(), &5.0.into())
     );
     assert!(stop["description"].as_str().unwrap().contains('m') && stop["default"].is_number());
+    let wall = kinds.iter().find(|kind| kind["title"] == "wall-follower").unwrap();
+    assert_eq!(wall["properties"]["side"]["enum"], serde_json::json!(["left", "right"]));
     assert!(kinds.iter().all(|kind| kind["title"] != "robot"), "robots have a section of their own");
 }

@@ -4,7 +4,8 @@ use types::Duration;
 use types::value::Value;
 
 use super::script::{Step, What};
-use super::{Reply, Router, Staged};
+use super::{Reply, Router, Staged, first, timing_as};
+use crate::agent::AgentType;
 use crate::census::Given;
 use crate::executor::Change;
 use crate::plan::AgentPlan;
@@ -101,6 +102,38 @@ fn put(plan: &mut AgentPlan, key: &str, value: &Value) -> Reply<()> {
     Ok(())
 }
 
+/// Keeps a period within what its designer allows.
+fn check_range(plan: &AgentPlan) -> Reply<()> {
+    match (plan.period, plan.period_range) {
+        (Some(period), Some((least, most))) if !(least..=most).contains(&period) => Err(Refusal::new(
+            format!("the period of {} must lie from {least} to {most}, not {period}", plan.name),
+        )),
+        _ => Ok(()),
+    }
+}
+
+/// An agent of a plan as it is when a parameter, or an entry of [`TIMING_KEYS`], was set: what can be seen of a request before a system runs.
+/// Nothing is said of an agent with which something is wrong already.
+///
+/// # Errors
+/// Why it would be refused.
+pub fn with_set(agent: &AgentPlan, kind: &AgentType, key: &str, value: &Value) -> Result<AgentPlan, Refusal> {
+    let mut plan = agent.clone();
+    if TIMING_KEYS.contains(&key) {
+        put(&mut plan, key, value)?;
+        if timing_as(agent, kind).is_ok() {
+            timing_as(&plan, kind)?;
+            check_range(&plan)?;
+        }
+        return Ok(plan);
+    }
+    if let Ok((_, mut params)) = kind.read_params(&agent.params) {
+        params.set(key, value.clone());
+        plan.params = kind.read_params(&params).map_err(first)?.1;
+    }
+    Ok(plan)
+}
+
 impl Router {
     pub(super) fn set_timing(
         &mut self,
@@ -139,14 +172,7 @@ impl Router {
 
     fn stage_timing(&mut self, id: types::AgentId, plan: AgentPlan, staged: &mut Staged) -> Reply<()> {
         let known = &self.agents[&id];
-        if let (Some(period), Some((least, most))) = (plan.period, plan.period_range)
-            && !(least..=most).contains(&period)
-        {
-            return Err(Refusal::new(format!(
-                "the period of {} must lie from {least} to {most}, not {period}",
-                plan.name
-            )));
-        }
+        check_range(&plan)?;
         let timing = self.timing_for(&plan, &known.kind)?;
         self.check_budget(&plan, &timing, known.executor)?;
         let change = Change::Timing { slot: known.slot, timing };

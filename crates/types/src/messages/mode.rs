@@ -24,6 +24,12 @@ impl Coordination {
     pub const ALL: [Coordination; 4] =
         [Coordination::Fuzzy, Coordination::Priority, Coordination::Subsumption, Coordination::VectorSum];
 
+    /// The words of all of them.
+    pub const WORDS: [&str; 4] = {
+        let [a, b, c, d] = Coordination::ALL;
+        [a.word(), b.word(), c.word(), d.word()]
+    };
+
     /// In a word, as it stands in files.
     pub const fn word(self) -> &'static str {
         match self {
