@@ -33,6 +33,7 @@ mod trial;
 mod trouble;
 mod useful;
 
+use std::path::Path;
 use std::process::ExitCode;
 use std::sync::atomic::AtomicBool;
 use std::sync::{Arc, PoisonError};
@@ -392,14 +393,14 @@ mod tests {
     use types::messages::Transforms;
 
     /// Ten seconds of the scenario with a log; gives the log's bytes.
-    fn log_of(seed: u64, folder: &std::path::Path) -> Vec<u8> {
+    fn log_of(seed: u64, folder: &Path) -> Vec<u8> {
         let path = folder.join(format!("{seed}.mcap"));
         log_to(&path, seed, &[], Duration::secs(10));
         std::fs::read(path).unwrap()
     }
 
     /// Runs the exploration as long as that, with these settings, and logs it.
-    fn log_to(path: &std::path::Path, seed: u64, sets: &[String], limit: Duration) {
+    fn log_to(path: &Path, seed: u64, sets: &[String], limit: Duration) {
         let registry = with_robots(agents::registry());
         let scenario = Scenario { file: file::load("exploration", sets, &registry).unwrap(), registry };
         let ready = scenario.prepare(seed).unwrap();
