@@ -9,8 +9,8 @@ use types::{Text, Time};
 
 use crate::action::{Duty, NO_POSE, NOTHING, TOO_LONG, Whereabouts, bounded, offer};
 
-/// Why something ended.
-type Why = Text<127>;
+/// Why something ended: short enough to be handed back by value.
+type Why = Text<119>;
 
 /// What a motion may do.
 #[derive(Clone, Debug, Params)]
@@ -185,7 +185,10 @@ impl MoveAction {
             Some(Ok(manoeuvre)) => manoeuvre,
             Some(Err((progress, why))) => {
                 let (distance, angle) = (task.distance.abs(), task.angle);
-                return (Twist::ZERO, Report { progress: *progress, distance, angle, why: *why, ..report });
+                return (
+                    Twist::ZERO,
+                    Report { progress: *progress, distance, angle, why: why.as_str().into(), ..report },
+                );
             }
             None => return (Twist::ZERO, report),
         };

@@ -125,7 +125,7 @@ impl Agent for Navigation {
                 // Nothing has become of it, so what is being done goes on.
                 Some(_) => {
                     self.desk.asked = None;
-                    self.answer(Err(refused.why));
+                    self.answer(Err(refused.why.as_str()));
                 }
                 None => self.desk.hear(&refused),
             }
@@ -161,7 +161,7 @@ impl Navigation {
             }
             Err(why) => {
                 self.owed = owed(0, Name::EMPTY);
-                self.answer(Err(why));
+                self.answer(Err(why.as_str()));
             }
         }
     }
@@ -187,17 +187,17 @@ impl Navigation {
         }
         let Report { progress, why, .. } = self.desk.report;
         match progress {
-            Progress::Refused => self.answer(Err(why)),
+            Progress::Refused => self.answer(Err(why.as_str())),
             Progress::Underway if self.status.is_wired() && waited < SETTLED => {}
             _ => self.answer(Ok(())),
         }
     }
 
-    fn answer(&mut self, what: Result<(), Why>) {
+    fn answer(&mut self, what: Result<(), &str>) {
         let Some(Owed { via, call, number, mode, .. }) = self.owed.take() else { return };
         let answer = match what {
             Ok(()) => Answer { accepted: true, task: number, why: mode.as_str().into() },
-            Err(why) => Answer { why, ..Answer::default() },
+            Err(why) => Answer { why: why.into(), ..Answer::default() },
         };
         match via {
             Via::Go => self.go.answer(&call, answer),
@@ -225,8 +225,8 @@ struct Owed {
     at: Time,
 }
 
-/// Why not.
-type Why = Text<127>;
+/// Why not: short enough to be handed back by value.
+type Why = Text<119>;
 
 const LOST: &str = "the robot does not know where it is: the localizer gives no pose";
 /// For so long an answer waits for an action to refuse what it cannot do: some steps of it.
@@ -413,7 +413,8 @@ impl Desk {
         } else if self.confirmed {
             // The real-time side had it and has it no more: somebody changed the mode, or somebody whom it needs has died.
             self.report.progress = Progress::Halted;
-            self.report.why = "somebody changed the mode, or an agent that it needs has died".into();
+            self.report.why =
+                "somebody changed the mode or drove by hand, or an agent that it needs has died".into();
         }
     }
 

@@ -162,8 +162,11 @@ impl ProcessSupervisor {
         let what = words(task.motion);
         let others: Vec<&str> =
             self.params.modes.known().filter(|known| does(known)).map(Known::name).collect();
-        let others =
-            if others.is_empty() { "no mode has one".into() } else { format!("in: {}", others.join(", ")) };
+        let others = if others.is_empty() {
+            "no mode has such a one".into()
+        } else {
+            format!("that is done in: {}", others.join(", "))
+        };
         Some(format!("nobody in the mode \"{}\" {what}; {others}", task.mode))
     }
 

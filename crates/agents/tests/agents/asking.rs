@@ -147,7 +147,7 @@ fn who_asks_is_answered_what_will_become_of_it_and_every_task_ends_with_its_reas
     let expected = [
         (true, 1, "goto"),
         (false, 0, "there is no mode \"gotto\"; did you mean \"goto\"?"),
-        (false, 0, "nobody in the mode \"move-only\" goes to a place; in: goto"),
+        (false, 0, "nobody in the mode \"move-only\" goes to a place; that is done in: goto"),
         (false, 0, "the mode \"nobody\" needs \"gone\", which is not there or not alive"),
         (false, 0, "x and y are needed, as in x=3 y=1"),
         (false, 0, "5 m/s is faster than the move action's linear_max of 0.5 m/s"),

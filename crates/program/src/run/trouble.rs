@@ -187,9 +187,9 @@ fn what_cannot_be_done_ends_with_its_reason_and_leaves_what_is_being_done() {
     assert!(off < 0.02, "{off} m off");
     let whys = [2, 3, 4, 5, 6].map(|task| ends(&summary, task, Progress::Refused).last.why);
     let expected = [
-        "nobody in the mode \"idle\" goes to a place; in: goto, goto+avoid",
-        "nobody in the mode \"teleoperation\" goes to a place; in: goto, goto+avoid",
-        "nobody in the mode \"wall-following\" goes to a place; in: goto, goto+avoid",
+        "nobody in the mode \"idle\" goes to a place; that is done in: goto, goto+avoid",
+        "nobody in the mode \"teleoperation\" goes to a place; that is done in: goto, goto+avoid",
+        "nobody in the mode \"wall-following\" goes to a place; that is done in: goto, goto+avoid",
         "there is no mode \"gotto\"; did you mean \"goto\"?",
         "5 m/s is faster than the move action's linear_max of 0.5 m/s",
     ];
