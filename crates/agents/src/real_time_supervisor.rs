@@ -186,9 +186,9 @@ impl Door {
         report.progress.is_over().then_some((report.progress, report.why))
     }
 
-    /// Whether somebody may drive for a task.
+    /// Whether somebody drives for a task, and has told what is left of it.
     fn is_underway(&self) -> bool {
-        self.task.number != 0 && !self.status.progress.is_over()
+        self.task.number != 0 && !self.status.progress.is_over() && self.fresh.is_none()
     }
 
     /// Makes the robot stand; the status tells why.
@@ -295,6 +295,8 @@ mod tests {
         let mut door = Door::default();
         assert!(!door.is_underway(), "there is none");
         door = underway();
+        assert!(!door.is_underway(), "no action has told what is left of it");
+        door.hear(GOTO, Report { task: 1, progress: Progress::Underway, ..Report::default() }, at(20));
         assert!(door.is_underway());
         door.stand(Progress::Halted, Text::default());
         assert!(!door.is_underway());

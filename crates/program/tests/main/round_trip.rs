@@ -86,12 +86,13 @@ fn a_table_of_decisions_with_conditions_survives_whichever_way_its_keys_are_writ
     let text = r#"
         name = "deciding"
         agent.safety = { is = "safety-monitor", on = "ranges" }
+        agent.track = { is = "image-tracker", on = "rgb" }
         agent.decision = { is = "decision-maker", on = "safety", signals = ["faces"] }
         wires."safety.safety" = "decision.safety"
         [decide]
         battery.low = { when = "battery < 0.2", until = "battery > 0.3", priority = 60, goal = "charge", safety = 0.0 }
         "crowd" = { when = 'faces > 3 && !(nearest < 1.5)', safety = { active = false } }
-        target.seen = { goal = "follow", safety = { weight = 1.0, importance = 1, rate = 0.5, active = true, method = "exact" } }
+        target.seen = { goal = "follow", safety = { weight = 1.0, importance = 1, rate = 0.5, active = true }, track = { method = "exact" } }
         "free" = { safety = { rate = 0.25 } }
     "#;
     let plan = read_plan(text, "deciding.toml", &registry()).unwrap_or_else(|mistakes| panic!("{mistakes}"));
