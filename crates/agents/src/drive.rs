@@ -268,17 +268,17 @@ impl Hands {
         wanted = self.answer.heeded(wanted, self.commanded, self.motion, now);
         let limited = limit(&params.limits(), wanted, self.commanded, forward, dt);
         self.cuts = limited.cuts;
-        self.commanded = match Dated::fresh(&self.reflex, now, params.reflex_hold) {
-            Some(bound) => bounded(limited.twist, bound),
-            None if params.reflex_needed => Twist::ZERO,
-            None => limited.twist,
-        };
-        let is_unguarded =
-            params.reflex_needed && Dated::fresh(&self.reflex, now, params.reflex_hold).is_none();
+        let bound = Dated::fresh(&self.reflex, now, params.reflex_hold);
+        let is_unguarded = params.reflex_needed && bound.is_none();
         if is_unguarded && !self.is_unguarded {
             runtime::note!("nobody says how fast it may drive: standing");
         }
         self.is_unguarded = is_unguarded;
+        self.commanded = match bound {
+            Some(bound) => bounded(limited.twist, bound),
+            None if is_unguarded => Twist::ZERO,
+            None => limited.twist,
+        };
         self.commanded
     }
 

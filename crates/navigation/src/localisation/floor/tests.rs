@@ -35,6 +35,15 @@ fn go(localizer: &mut FloorLocalizer<PlanField>, roamer: &mut Roamer<'_>) -> Out
     localizer.update(roamer.odometry, &roamer.look(), &roamer.geometry)
 }
 
+/// One that knows where its robot is, after ten scans on its way.
+fn tracked(floor: &PlanField, seed: u64) -> (FloorLocalizer<PlanField>, Roamer<'_>) {
+    let mut roamer = Roamer::new(floor, anywhere(floor, seed), seed);
+    let mut localizer = lost(floor, seed);
+    put(&mut localizer, &roamer, roamer.pose);
+    (0..10).for_each(|_| assert_eq!(go(&mut localizer, &mut roamer), Outcome::Fixed));
+    (localizer, roamer)
+}
+
 fn off(localizer: &FloorLocalizer<PlanField>, roamer: &Roamer<'_>) -> f64 {
     let pose = localizer.pose().expect("it is known");
     pose.position().distance(roamer.pose.position()) + 0.3 * wrap(pose.heading - roamer.pose.heading).abs()
@@ -122,10 +131,7 @@ fn among_people(roamer: &Roamer, number: u64) -> Vec<f32> {
 fn people_who_hide_the_floor_do_not_lose_it_but_being_carried_away_among_them_does() {
     let floor = floor();
     for seed in 0..SEEDS / 2 {
-        let mut roamer = Roamer::new(&floor, anywhere(&floor, seed), seed);
-        let mut localizer = lost(&floor, seed);
-        put(&mut localizer, &roamer, roamer.pose);
-        (0..10).for_each(|_| assert_eq!(go(&mut localizer, &mut roamer), Outcome::Fixed));
+        let (mut localizer, mut roamer) = tracked(&floor, seed);
         let mut hidden = 0;
         for scan in 0..100 {
             // It stands and waits; every tenth scan it goes on.
@@ -152,10 +158,7 @@ fn people_who_hide_the_floor_do_not_lose_it_but_being_carried_away_among_them_do
 fn a_wall_that_was_put_up_close_before_it_hides_most_and_it_still_knows_where_it_is() {
     let floor = floor();
     for seed in 0..SEEDS / 2 {
-        let mut roamer = Roamer::new(&floor, anywhere(&floor, seed), seed);
-        let mut localizer = lost(&floor, seed);
-        put(&mut localizer, &roamer, roamer.pose);
-        (0..10).for_each(|_| assert_eq!(go(&mut localizer, &mut roamer), Outcome::Fixed));
+        let (mut localizer, roamer) = tracked(&floor, seed);
         let geometry = roamer.geometry;
         for scan in 0..1000 {
             // It stands, and the noise of its laser makes each scan another one.
